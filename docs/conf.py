@@ -52,6 +52,7 @@ NAVIGATION = {
             "docs/tutorial_scada",
             "docs/tutorial_ros",
             "docs/filler_block",
+            "docs/brewery",
             "docs/cookbook/index",
             "docs/troubleshooting",
             "docs/gallery",

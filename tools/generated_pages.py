@@ -47,7 +47,7 @@ def pages() -> Iterator[tuple[Path, str]]:
     defaults = importlib.import_module("defaults")
     yield defaults.PAGE, defaults.page()
     text = (DOCS / "accuracy.md").read_text(encoding="utf-8")
-    yield DOCS / "accuracy.md", accuracy.page(text)
+    yield DOCS / "accuracy.md", accuracy.page(importlib.import_module("stepped").page(text))
     yield promises.PAGE, promises.page()
     yield from accuracy.tables().items()
     text = stability.PAGE.read_text(encoding="utf-8")

@@ -113,15 +113,17 @@ class Plant:
                 reach[axis] = max(reach[axis], shape.fastest_point)
         return reach
 
-    def moving_at(self, positions: Sequence[float], lags: Sequence[float] = ()) -> tuple[RailShape, ...]:
+    def moving_at(
+        self, positions: Sequence[float], lags: Sequence[float] = (), only: Sequence[int] | None = None
+    ) -> tuple[RailShape, ...]:
         """Return the bodies that are present, each as a rail, at positions (m or rad) of the axes.
 
-        lags: of the bodies where machines have slipped, m or rad; without any, those of the scene.
+        lags: of the bodies where machines have slipped, m or rad; without any, those of the scene. only: indices of
+        bodies; None: all.
         """
-        bodies = (
-            shape if shape.lag == lag else replace(shape, lag=lag)
-            for shape, lag in zip(self.moving, lags or [shape.lag for shape in self.moving], strict=True)
-        )
+        lags = lags or [shape.lag for shape in self.moving]
+        shapes = ((self.moving[body], lags[body]) for body in (range(len(self.moving)) if only is None else only))
+        bodies = (shape if shape.lag == lag else replace(shape, lag=lag) for shape, lag in shapes)
         return bodies_at(bodies, {axis.name: at for axis, at in zip(self.axes, positions, strict=True)})
 
     @cached_property

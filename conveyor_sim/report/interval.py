@@ -23,6 +23,9 @@ from conveyor_sim.line.machines.counter_rows import TEXTS, DeviceSums, counter_r
 from conveyor_sim.line.machines.efficiency import CATEGORIES
 from conveyor_sim.report.periods import Period
 from conveyor_sim.report.span import Span
+from conveyor_sim.scene import parse_again, parse_overrides
+from conveyor_sim.scene.parts.sink import Sink
+from conveyor_sim.scene.parts.source import Source
 
 Counts = NDArray[np.int64]
 """(devices + 1, 4): COUNTS of each row of the counters."""
@@ -61,6 +64,7 @@ def counters_within(
     counted[-1, 0] = counted[exits, 0].sum()
     counted[-1, 2] = counted[:-1, 2].sum()
     rates = _set_rates(bag, last)
+    batches = _batches(bag) if span.start > 0 else {}
     intervals = {}
     for row, name in enumerate(names[:-1]):
         times: dict[str, float] = dict.fromkeys(CATEGORIES, 0.0)
@@ -69,7 +73,8 @@ def counters_within(
         ran = [period for period in periods.get(name, ()) if period.category == "running"]
         cycles = float(counted[row, 0])
         if row in images.first_cycles and name in rates and span.start > 0:  # a cycle may have begun before the span
-            cycles += min(1.0, _at_set_rate(ran, rates[name], images.first_cycles[row] * tick)) - 1.0
+            batch = float(batches.get(name, 1))
+            cycles += min(batch, _at_set_rate(ran, rates[name], images.first_cycles[row] * tick)) - batch
         set_cycles = _at_set_rate(ran, rates[name], math.inf) if name in rates else 0.0
         numbers = tuple(counted[row].tolist())
         rated = float(last.rate[row]), float(last.rate_limit[row])
@@ -84,6 +89,18 @@ def counters_within(
     columns: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     columns |= {name: tuple(row[name] for row in rows) for name in TEXTS}
     return CounterColumns(**columns, bottleneck=tuple(last.bottleneck))
+
+
+def _batches(bag: Bag) -> dict[str, int]:
+    """Return the bottles per cycle of the machines that process several at once."""
+    scene = parse_again(bag.line.scene_text, f"{bag.path} (recorded scene)", parse_overrides(bag.line.overrides))
+    batches = {}
+    for name, machine in scene.machines.items():
+        if isinstance(machine, Sink):
+            batches[f"machines/{name}"] = machine.at_once
+        elif isinstance(machine, Source) and machine.layer is not None:
+            batches[f"machines/{name}"] = len(machine.layer.offsets())
+    return batches
 
 
 def _class_of(bag: Bag, device: str) -> str:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of layout.md, filler_block.md, check.md and build_a_line.md in docs: python docs/studies/scene_pictures.py.
+"""Pictures of layout, filler_block, brewery, check and build_a_line in docs: python docs/studies/scene_pictures.py.
 
 Needs matplotlib and Pillow, as the tests do.
 """
@@ -14,6 +14,8 @@ from part_pictures import draw_state, save_image
 from PIL import Image
 
 from conveyor_sim.control.filler_block import filler_block
+from conveyor_sim.control.load import load
+from conveyor_sim.control.scan import Controller
 from conveyor_sim.report.figures.draw import plot_scene
 from conveyor_sim.run.scan_loop import ScanLoop
 from conveyor_sim.scene import Scene, load_scene
@@ -28,6 +30,9 @@ MOMENT = 22.0
 """Simulated time of the picture of the layout, s."""
 RUNNING = 25.0
 """Simulated time of the picture of the filler block, s."""
+PRODUCING = 60.0
+"""Simulated time of the picture of the brewery, s."""
+BREWERY = DOCS.parent / "examples" / "brewery"
 
 
 def example(folder: Path) -> Scene:
@@ -38,11 +43,11 @@ def example(folder: Path) -> Scene:
     return load_scene(folder / "line.yaml")
 
 
-def filling() -> Simulation:
-    """Return the filler block after its start, with bottles in all its machines."""
-    simulation = Simulation(load_scene(scene_path("filler_block")), threads=1)
-    scans = ScanLoop(simulation, filler_block())
-    while simulation.time < RUNNING:
+def started(scene: Scene, controller: Controller, until: float) -> Simulation:
+    """Return a line whose start button was pressed at the beginning, at a time in s."""
+    simulation = Simulation(scene, threads=1)
+    scans = ScanLoop(simulation, controller)
+    while simulation.time < until:
         if simulation.tick == 1:
             simulation.command(["panel/start/press"], [1.0], writer_kind="operator")
         scans.before_tick(None)
@@ -56,7 +61,11 @@ def main() -> None:
         simulation = Simulation(example(Path(folder)), threads=1)
         simulation.advance(round(MOMENT / simulation.scene.tick))
         print(draw_state(simulation, DOCS / "images" / "layout.webp"))
-        print(draw_state(filling(), DOCS / "images" / "filler_block.webp"))
+        filling = started(load_scene(scene_path("filler_block")), filler_block(), RUNNING)
+        print(draw_state(filling, DOCS / "images" / "filler_block.webp"))
+        brewery = load(f"{BREWERY / 'brewery.py'}:brewery")
+        producing = started(load_scene(BREWERY / "brewery.yaml"), brewery, PRODUCING)
+        print(draw_state(producing, DOCS / "images" / "brewery.webp"))
         for page, scene in CHECKED.items():
             drawn = plot_scene(load_scene(scene_path(scene)), Path(folder) / page)
             print(save_image(Image.open(drawn).convert("RGB"), DOCS / "images" / f"{page}.webp"))

@@ -13,7 +13,7 @@ from conveyor_sim.testing.plugin import Lines
 
 FOLDER = Path(__file__).resolve().parents[1] / "brewery"
 RATE = 40_000 / 3600  # bottles per second
-AT_START = 4800
+AT_START = 5492
 
 
 def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: int) -> dict[str, Any]:
@@ -23,11 +23,11 @@ def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: 
 
 
 SHORT = {
+    "parameters": {"dwell": 2.0},
     "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 8.2, -0.55, 10, 6)],
     "conveyors": {belt: {"speed": 0.5} for belt in ("supply", "filled", "cold", "packing")},
     "machines": {
         "depalletiser": {"layer": {"rows": 6, "columns": 15, "pitch": 0.0675, "pusher": "sweep"}},
-        "pasteuriser": {"hold": 2.0},
         "labeller": {"sets": {"label": {"share": 0.9}}},
     },
     "zones": {"layer": {"full_at": 90}},
@@ -74,7 +74,7 @@ def test_the_line_is_empty_before_the_next_bottle_comes(line: Lines) -> None:
     assert types() == {empty, full}
     plant.eventually(lambda s: s["carousels/block_heads/good"] == 24, within=60.0)
     assert types() == {full}
-    plant.eventually(lambda s: s["machines/packer/taken"] == 72, within=100.0)
+    plant.eventually(lambda s: s["machines/packer/taken"] == 72, within=130.0)
     assert plant.simulation.counts.fed == 0
     plant.eventually(lambda s: s["machines/depalletiser/produced"] == 90, within=40.0)
     assert types() == {full, light}
@@ -82,3 +82,19 @@ def test_the_line_is_empty_before_the_next_bottle_comes(line: Lines) -> None:
     assert rejected == plant.signals["machines/camera/bad"] == plant.signals["machines/labeller/defective"] > 0
     assert plant.signals["machines/reject/rejected_good"] == plant.signals["machines/reject/missed"] == 0
     assert plant.simulation.bottles().type.tolist().count(full) == 84 - 72 - rejected < 24
+
+
+def test_the_failure_of_the_depalletiser_explains_the_low_supply(line: Lines) -> None:
+    early = {
+        "machines": {"depalletiser": {"failures": {"pallet": {"between": {"mean": 0.5}, "repair": {"mean": 2.0}}}}}
+    }
+    plant = line(FOLDER / "brewery.yaml", {**SHORT, **early}, variant="failures")
+    plant.attach(StructuredText(FOLDER / "plc"))
+    plant.run_for(2.5)
+    assert plant.alarms == {"supply_low"}
+    plant.panel.press("start")
+    plant.eventually(lambda s: s["machines/depalletiser/fault"], within=20.0)
+    plant.run_for(0.1)
+    assert plant.alarms == {"machines/depalletiser/fault"}
+    plant.eventually(lambda s: not s["machines/depalletiser/fault"], within=10.0)
+    assert plant.signals["machines/depalletiser/running"]

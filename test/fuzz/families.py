@@ -147,7 +147,9 @@ def _of_impulses(family: Family, draw: random.Random) -> Family:
     if draw.random() < 0.125:
         return family
     damping = draw.choice((("none",), ("normal",), ("none", "normal")))
-    return replace(family, elastic=("linear",), damping=damping, atan=False, ring=False, ledger=False, axes=False)
+    family = replace(family, elastic=("linear",), damping=damping, atan=False, ring=False)
+    movers, wheels = draw.random() < 0.6, draw.random() < 0.3
+    return replace(family, movers=movers, lifts=movers and draw.random() < 0.3, wheels=wheels)
 
 
 def _some(draw: random.Random, names: tuple[str, ...], least: int = 1) -> tuple[str, ...]:
@@ -171,5 +173,6 @@ CI_FAMILIES = (
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
     Family(rails=("segment", "arc"), wheels=True, panel=True, infeeds=True, ledger=True),
+    replace(_PLAIN, integrator="impulses", damping=("normal",), drives=True, movers=True),
 )
 """Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

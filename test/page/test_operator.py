@@ -150,6 +150,9 @@ def test_a_recording_shows_the_panel(browser: Any, tmp_path: Path) -> None:
         page.keyboard.press("End")
         soon(page, lambda: "latched" in page.inner_text("[data-part=estop] .state"), "the panel at the end")
         assert page.locator("[data-part=stack] .state").all_inner_texts()[0] == "red on"
+        for size in ((900, 700), (1000, 500)):  # a tablet across: panel, plan, trends and tabs do not fit at once
+            page.set_viewport_size({"width": size[0], "height": size[1]})
+            soon(page, lambda: page.locator("#plan").bounding_box()["height"] >= 220, "a plan with room")
 
 
 def test_a_line_without_a_panel_has_no_room_for_one(browser: Any, html: Path) -> None:

@@ -3,14 +3,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from click.testing import CliRunner
 from facts import missing, stating
-from report.test_production import FAILING_LINE, record
+from report.test_production import FAILING_LINE, MACHINES, record
 
 from conveyor_sim.cli import main
 from conveyor_sim.columns.counters import CounterColumns
@@ -31,9 +33,9 @@ def bag(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return record(tmp_path_factory.mktemp("interval") / "bag", ticks=TICKS, scene=scene)
 
 
-def counted(start: int, stop: int) -> CounterColumns:
+def counted(start: int, stop: int, overrides: Mapping[str, Any] | None = None) -> CounterColumns:
     """Return the counters of the same run at `stop`, reset at `start` (ticks)."""
-    sim = Simulation(load_scene(FAILING_LINE))
+    sim = Simulation(load_scene(FAILING_LINE, overrides))
     sim.advance(start)
     sim.give(Input("commands", "shift", "operator", RESET_COUNTERS, (), ()))
     sim.advance(stop - start)
@@ -57,6 +59,23 @@ def test_a_span_has_the_figures_of_counters_reset_at_its_start(bag: Path, start:
             assert (~(values < others - missed)).all(), field
         else:
             np.testing.assert_allclose(values, others, atol=1e-9, rtol=1e-9, err_msg=field)
+
+
+def test_a_span_that_begins_within_a_case_counts_the_part_of_it(tmp_path: Path) -> None:
+    """A packer takes three bottles at once."""
+    region = [[2.15, -0.05], [2.4, -0.05], [2.4, 0.05], [2.15, 0.05]]
+    cases: dict[str, Any] = {"machines": {"packer": {"at_once": 3, "region": region}}}
+    scene = load_scene(FAILING_LINE, {**cases, "outputs": {"signals": 100.0}})
+    bag = record(tmp_path / "bag", ticks=TICKS, scene=scene)
+    row, parts = MACHINES.index("machines/packer"), set()
+    for start in range(600, 1000, 57):
+        within, expected = read_production(bag, Times(start * 0.01, 12.5)).counters, counted(start, 1250, cases)
+        assert within.processed[row] == expected.processed[row] > 0
+        assert within.running[row] == pytest.approx(expected.running[row])
+        missed = 0.02 / expected.running[row]
+        assert -1e-9 <= expected.effectiveness[row] - within.effectiveness[row] <= missed
+        parts.add(round(within.effectiveness[row], 2))
+    assert len(parts) > 1
 
 
 def test_spans_add_up_and_lose_no_bottle(bag: Path) -> None:

@@ -27,10 +27,13 @@ MOST_PRESSED = 16
 COLOURS = 63
 """Most colours of pairs. Pairs of one colour share no bottle, except in the last colour, which takes all others."""
 
+GROUPS = 9
+"""Groups of pairs in a colour: by kind of contact, all further kinds in one group, and pairs of two sleepers."""
+
 
 @group
 class PairImpulses(NamedTuple):
-    """Pairs in the order of their colours, and the impulses that they hold."""
+    """Pairs in the order of their colours and groups, and the impulses that they hold."""
 
     i: U4
     j: U4
@@ -41,7 +44,7 @@ class PairImpulses(NamedTuple):
     start: I8
     """First pair of each colour, (COLOURS + 1,)."""
     next: I8
-    """Scratch of a rebuild, (COLOURS,)."""
+    """Scratch of a rebuild, (GROUPS * COLOURS,)."""
     row: F8
     """Impulse on j, (ROW * P,)."""
     kept_i: U4
@@ -172,6 +175,8 @@ class Impulses(NamedTuple):
     """1: lists were rebuilt, so `warm` must be summed anew, (1,)."""
     mask: I8
     """Scratch of a rebuild: colours of each bottle's pairs, one bit each, (S,)."""
+    group: I8
+    """Scratch of a rebuild: group of each kind of pair, (T * T,)."""
     sleep: Sleep | None
     bodies: BodyImpulses | None
     work: WorkScratch | None

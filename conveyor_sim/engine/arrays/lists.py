@@ -4,7 +4,7 @@
 from typing import NamedTuple
 
 from conveyor_sim.engine.arrays.impulses import NearImpulses
-from conveyor_sim.engine.arrays.types import F8, I8, U4
+from conveyor_sim.engine.arrays.types import F8, I4, I8, U4
 from conveyor_sim.engine.compiler.groups import group
 
 
@@ -54,6 +54,13 @@ class Neighbourhood(NamedTuple):
     """Starts of the hashed cells in `order`, (buckets + 1,); the number of buckets is a power of two."""
     order: U4
     """Slots by bucket, (S,)."""
+    sorted_x: F8
+    """Scratch of a rebuild, in the order of `order`: positions, radii, and cells as one number each, (S,)."""
+    sorted_y: F8
+    sorted_radius: F8
+    sorted_cell: I8
+    home: I4
+    """Scratch of a rebuild: cell of the static grid under each bottle, (S,); -1: none, or a free slot."""
 
 
 @group

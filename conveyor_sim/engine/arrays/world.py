@@ -104,5 +104,7 @@ class Worker(NamedTuple):
     history: ContactLoads
     chunk: F8
     """Columns of a chunk of pairs (`impulses/pairs.py`), (COLUMNS * CHUNK,)."""
+    listed: I8
+    """Pairs of that chunk, (CHUNK,)."""
     callees: I8
     """Addresses of kernels that step kernels call, (2,) (`integrators/callees.py`)."""

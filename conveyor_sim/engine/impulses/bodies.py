@@ -70,13 +70,8 @@ def find_bodies(world: World, worker: Worker, impulses: Any, bodies: Any, h: flo
     near, piece = world.near_bodies, bodies.piece
     for i in range(first, end):
         c = CONTACTS * i
-        if (
-            near.start[i] < near.start[i + 1]
-            or piece[c] >= 0
-            or piece[c + 1] >= 0
-            or piece[c + 2] >= 0
-            or (piece[c + 3] >= 0)
-        ):
+        # -1 in all bits: no piece.
+        if near.start[i] < near.start[i + 1] or piece[c] & piece[c + 1] & piece[c + 2] & piece[c + 3] != -1:
             _find(i, world, world.moving, near, worker.rail_contacts, impulses, bodies, h)
 
 

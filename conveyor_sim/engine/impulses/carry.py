@@ -3,7 +3,7 @@
 
 from typing import Any
 
-from conveyor_sim.engine.arrays.impulses import COLOURS, ROW
+from conveyor_sim.engine.arrays.impulses import COLOURS, GROUPS, ROW
 from conveyor_sim.engine.compiler.compile import fill, kernel, part
 from conveyor_sim.engine.impulses.meeting import mark_met, wake_marked
 from conveyor_sim.engine.impulses.runs import plan_runs
@@ -67,9 +67,11 @@ def group_pairs(bottles: Any, pairs: Any, impulses: Any) -> None:
 
 @part
 def _colour(bottles: Any, pairs: Any, held: Any, impulses: Any) -> None:
-    mask = impulses.mask
+    """Colour the pairs of a list. Put those of a colour in the order of groups: kinds of contact, then sleepers."""
+    mask, group_of, kinds = impulses.mask, impulses.group, 0
     fill(mask, 0)
-    fill(held.start, 0)
+    fill(group_of, -1)
+    fill(held.next, 0)
     for p in range(pairs.used[0]):
         i, j = pairs.i[p], pairs.j[p]
         taken, colour = mask[i] | mask[j], 0
@@ -77,41 +79,54 @@ def _colour(bottles: Any, pairs: Any, held: Any, impulses: Any) -> None:
             colour += 1
         mask[i] |= 1 << colour
         mask[j] |= 1 << colour
-        held.place[p] = colour
-        held.start[colour + 1] += 1
-    for colour in range(COLOURS):
-        held.start[colour + 1] += held.start[colour]
-        held.next[colour] = held.start[colour]
-    _place(bottles, pairs, held, impulses, impulses.sleep)
-
-
-@part
-def _place(bottles: Any, pairs: Any, held: Any, impulses: Any, sleep: Any) -> None:
-    """Put pairs in their places: in each colour those with an awake bottle first."""
-    if sleep is None:
-        for p in range(pairs.used[0]):
-            _put(bottles, pairs, held, impulses, p)
-        return
+        kind = _kind(bottles, impulses, i, j)
+        if group_of[kind] < 0:
+            group_of[kind] = min(kinds, GROUPS - 2)
+            kinds += 1
+        group = GROUPS - 1 if _both_sleep(impulses.sleep, i, j) else group_of[kind]
+        held.place[p] = GROUPS * colour + group
+        held.next[held.place[p]] += 1
+    _start_groups(held, impulses.sleep)
     for p in range(pairs.used[0]):
-        if sleep.asleep[pairs.i[p]] == 0 or sleep.asleep[pairs.j[p]] == 0:
-            _put(bottles, pairs, held, impulses, p)
-    for colour in range(COLOURS):
-        sleep.end[colour] = held.next[colour]
-    if sleep.sleepers[0] > 0:
-        for p in range(pairs.used[0]):
-            if sleep.asleep[pairs.i[p]] != 0 and sleep.asleep[pairs.j[p]] != 0:
-                _put(bottles, pairs, held, impulses, p)
+        i, j, place = pairs.i[p], pairs.j[p], held.next[held.place[p]]
+        held.next[held.place[p]] += 1
+        held.place[p] = place
+        held.i[place] = i
+        held.j[place] = j
+        held.kind[place] = _kind(bottles, impulses, i, j)
 
 
 @part
-def _put(bottles: Any, pairs: Any, held: Any, impulses: Any, p: int) -> None:
-    i, j, colour = pairs.i[p], pairs.j[p], held.place[p]
-    place = held.next[colour]
-    held.next[colour] += 1
-    held.place[p] = place
-    held.i[place] = i
-    held.j[place] = j
-    held.kind[place] = bottles.type[i] * impulses.types + bottles.type[j]
+def _kind(bottles: Any, impulses: Any, i: int, j: int) -> int:
+    return bottles.type[i] * impulses.types + bottles.type[j]
+
+
+@part
+def _both_sleep(sleep: Any, i: int, j: int) -> bool:
+    if sleep is None:
+        return False
+    return sleep.asleep[i] != 0 and sleep.asleep[j] != 0
+
+
+@part
+def _start_groups(held: Any, sleep: Any) -> None:
+    """Turn the numbers of pairs in `next` into the first place of each group."""
+    total = 0
+    for colour in range(COLOURS):
+        held.start[colour] = total
+        for group in range(GROUPS):
+            if group == GROUPS - 1:
+                _end_awake(sleep, colour, total)
+            count = held.next[GROUPS * colour + group]
+            held.next[GROUPS * colour + group] = total
+            total += count
+    held.start[COLOURS] = total
+
+
+@part
+def _end_awake(sleep: Any, colour: int, end: int) -> None:
+    if sleep is not None:
+        sleep.end[colour] = end
 
 
 @part

@@ -3,6 +3,9 @@
 
 No two pairs of a colour share a bottle, so its pairs can be divided among threads and taken in any order: the bits are
 the same. The columns of a chunk lie in one array at constant distances. LLVM vectorises the law only then.
+
+A pair that holds nothing and can't touch in this substep is left out of its chunk: the law would change nothing. In a
+line these are half of the pairs. Constants are read by pair only in chunks whose pairs differ in kind.
 """
 
 import math
@@ -11,7 +14,7 @@ from typing import Any
 from numba import uint64
 
 from conveyor_sim.engine.arrays.impulses import BODY, COLOURS, CONSTANTS, ROW, PairImpulses
-from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.arrays.world import Worker, World
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.impulses.constants import (
@@ -48,6 +51,9 @@ _SHIFT_X, _SHIFT_Y, _ACT, _NORMAL, _SPEED = (uint64(CHUNK * column) for column i
 _FIRST = 21
 """First column of the constants of each pair, if these differ."""
 
+NEARER, FARTHER = 1.001, 1e-9
+"""Margins for rounding in the test of contacts that can't touch: factor of the way, and distance, m."""
+
 
 @part
 def sweep_pairs(world: World, worker: Worker, impulses: Any, h: float, threshold: float, last: bool) -> None:
@@ -71,37 +77,80 @@ def _sweep(
         if colour == COLOURS - 1:
             # These pairs may share bottles, so one thread takes them all.
             begin, stop = 0, (end - start if worker.rank == 0 else 0)
-        for first in range(begin, stop, CHUNK):
-            count = min(CHUNK, stop - first)
-            _gather(impulses, impulses.alike, pairs, worker.chunk, start + first, count)
-            _solve(worker.chunk, impulses, impulses.alike, threshold, world.settings.slip_limit, h, count)
-            _scatter(impulses, pairs, worker.chunk, start + first, count)
-            _note(world.peaks, impulses, pairs, worker.chunk, h, last, start + first, count)
-            _book(world.ledger, impulses.work, impulses, pairs, worker.chunk, start, first, count)
-            _load(world.damage, impulses.loads, impulses, pairs, worker.chunk, h, last, start + first, count)
+        next_pair = start + begin
+        while next_pair < start + stop:
+            next_pair, count = _gather(impulses, pairs, worker.chunk, worker.listed, h, next_pair, start + stop)
+            _solve_chunk(worker, impulses, impulses.alike, pairs, threshold, world.settings.slip_limit, h, count)
+            _scatter(impulses, pairs, worker.chunk, worker.listed, count)
+            _note(world.peaks, impulses, pairs, worker.chunk, worker.listed, h, last, count)
+            _book(world.ledger, impulses.work, impulses, pairs, worker.chunk, worker.listed, start, count)
+            _load(world.damage, impulses.loads, impulses, pairs, worker.chunk, worker.listed, h, last, count)
         wait_for_all(worker)
 
 
 @part
-def _gather(impulses: Any, alike: Any, pairs: PairImpulses, chunk: F8, first: int, count: int) -> None:
+def _gather(
+    impulses: Any, pairs: PairImpulses, chunk: F8, listed: I8, h: float, first: int, end: int
+) -> tuple[int, int]:
+    """Fill a chunk with pairs from first on that may act. Return the next pair, at most end, and the number filled."""
     body = impulses.body
-    for c in range(uint64(count)):
-        p = uint64(first) + c
-        a, b = uint64(pairs.i[p]) * _BODY, uint64(pairs.j[p]) * _BODY
-        chunk[_X + c] = body[b] - body[a]
-        chunk[_Y + c] = body[b + uint64(1)] - body[a + uint64(1)]
-        chunk[_VX + c] = body[b + uint64(2)] - body[a + uint64(2)]
-        chunk[_VY + c] = body[b + uint64(3)] - body[a + uint64(3)]
+    p, c = uint64(first), uint64(0)
+    while p < uint64(end) and c < uint64(CHUNK):
+        a, b, row = uint64(pairs.i[p]) * _BODY, uint64(pairs.j[p]) * _BODY, p * _ROW
+        x, y = body[b] - body[a], body[b + uint64(1)] - body[a + uint64(1)]
+        vx, vy = body[b + uint64(2)] - body[a + uint64(2)], body[b + uint64(3)] - body[a + uint64(3)]
+        held_x, held_y, held_turn = pairs.row[row], pairs.row[row + uint64(1)], pairs.row[row + uint64(2)]
+        wait = pairs.row[row + uint64(3)]
+        chunk[_X + c], chunk[_Y + c] = x, y
+        chunk[_VX + c], chunk[_VY + c] = vx, vy
         chunk[_RIM + c] = body[b + uint64(4)] + body[a + uint64(4)]
-        row = p * _ROW
-        chunk[_HELD_X + c] = pairs.row[row]
-        chunk[_HELD_Y + c] = pairs.row[row + uint64(1)]
-        chunk[_HELD_TURN + c] = pairs.row[row + uint64(2)]
-        chunk[_WAIT + c] = pairs.row[row + uint64(3)]
-        if alike is None:
-            kind = uint64(pairs.kind[p]) * _KINDS
-            for constant in range(uint64(PEAK)):
-                chunk[uint64(CHUNK) * (uint64(_FIRST) + constant) + c] = impulses.pair_constants[kind + constant]
+        chunk[_HELD_X + c], chunk[_HELD_Y + c], chunk[_HELD_TURN + c] = held_x, held_y, held_turn
+        chunk[_WAIT + c] = wait
+        listed[c] = p
+        reach = body[a + uint64(7)] + body[b + uint64(7)] + FARTHER + h * NEARER * (abs(vx) + abs(vy))
+        idle = (held_x == 0.0) & (held_y == 0.0) & (held_turn == 0.0) & (wait == 0.0) & (x * x + y * y > reach * reach)
+        c += uint64(0) if idle else uint64(1)
+        p += uint64(1)
+    return int(p), int(c)
+
+
+@part
+def _solve_chunk(
+    worker: Worker,
+    impulses: Any,
+    alike: Any,
+    pairs: PairImpulses,
+    threshold: float,
+    slip_limit: float,
+    h: float,
+    count: int,
+) -> None:
+    """Apply the law to a chunk, with constants by pair only if its pairs differ in kind."""
+    if count == 0:
+        return
+    chunk, listed = worker.chunk, worker.listed
+    if alike is None:
+        if not _is_uniform(pairs, listed, count):
+            _gather_constants(impulses, pairs, chunk, listed, count)
+            _solve(chunk, impulses, None, 0, threshold, slip_limit, h, count)
+            return
+    _solve(chunk, impulses, 1, CONSTANTS * pairs.kind[listed[0]], threshold, slip_limit, h, count)
+
+
+@part
+def _is_uniform(pairs: PairImpulses, listed: I8, count: int) -> bool:
+    kind, other = pairs.kind[listed[0]], 0
+    for c in range(uint64(count)):
+        other |= pairs.kind[listed[c]] != kind
+    return other == 0
+
+
+@part
+def _gather_constants(impulses: Any, pairs: PairImpulses, chunk: F8, listed: I8, count: int) -> None:
+    for c in range(uint64(count)):
+        kind = uint64(pairs.kind[listed[c]]) * _KINDS
+        for constant in range(uint64(PEAK)):
+            chunk[uint64(CHUNK) * (uint64(_FIRST) + constant) + c] = impulses.pair_constants[kind + constant]
 
 
 @part
@@ -112,12 +161,17 @@ def _constant(chunk: F8, alike: Any, common: float, number: int, c: int) -> floa
 
 
 @part
-def _solve(chunk: F8, impulses: Any, alike: Any, threshold: float, slip_limit: float, h: float, count: int) -> None:
+def _solve(
+    chunk: F8, impulses: Any, alike: Any, kind: int, threshold: float, slip_limit: float, h: float, count: int
+) -> None:
+    """Apply the law to a chunk. alike: None if constants differ by pair; else they are those at `kind` of the table."""
     table = impulses.pair_constants
-    reach, mass, mass_inverse = table[REACH], table[MASS], table[MASS_INVERSE]
-    turn, turn_inverse, open_rate, closed_rate = table[TURN], table[TURN_INVERSE], table[OPEN], table[CLOSED]
-    open_gain, closed_gain, compliance = table[GAIN_OPEN], table[GAIN_CLOSED], table[COMPLIANCE]
-    rebound, friction, apart, fastest = table[REBOUND], table[FRICTION], table[APART], table[FASTEST]
+    reach, mass, mass_inverse = table[kind + REACH], table[kind + MASS], table[kind + MASS_INVERSE]
+    turn, turn_inverse = table[kind + TURN], table[kind + TURN_INVERSE]
+    open_rate, closed_rate = table[kind + OPEN], table[kind + CLOSED]
+    open_gain, closed_gain, compliance = table[kind + GAIN_OPEN], table[kind + GAIN_CLOSED], table[kind + COMPLIANCE]
+    rebound, friction = table[kind + REBOUND], table[kind + FRICTION]
+    apart, fastest = table[kind + APART], table[kind + FASTEST]
     for c in range(uint64(count)):
         x, y, vx, vy = chunk[_X + c], chunk[_Y + c], chunk[_VX + c], chunk[_VY + c]
         distance = math.sqrt(x * x + y * y)
@@ -167,10 +221,10 @@ def _solve(chunk: F8, impulses: Any, alike: Any, threshold: float, slip_limit: f
 
 
 @part
-def _scatter(impulses: Any, pairs: PairImpulses, chunk: F8, first: int, count: int) -> None:
+def _scatter(impulses: Any, pairs: PairImpulses, chunk: F8, listed: I8, count: int) -> None:
     body, free = impulses.body, impulses.free
     for c in range(uint64(count)):
-        p, act = uint64(first) + c, chunk[_ACT + c]
+        p, act = uint64(listed[c]), chunk[_ACT + c]
         row = p * _ROW
         pairs.row[row + uint64(3)] = chunk[_NEW_WAIT + c]
         if act == 0.0:
@@ -204,13 +258,13 @@ def _scatter(impulses: Any, pairs: PairImpulses, chunk: F8, first: int, count: i
 
 @part
 def _note(
-    peaks: Any, impulses: Any, pairs: PairImpulses, chunk: F8, h: float, last: bool, first: int, count: int
+    peaks: Any, impulses: Any, pairs: PairImpulses, chunk: F8, listed: I8, h: float, last: bool, count: int
 ) -> None:
     """Update peaks by impacts and, in the last sweep, by the impulses of pressed contacts."""
     if peaks is None:
         return
     for c in range(uint64(count)):
-        p, act, normal = uint64(first) + c, chunk[_ACT + c], chunk[_NORMAL + c]
+        p, act, normal = uint64(listed[c]), chunk[_ACT + c], chunk[_NORMAL + c]
         if act > 1.0:
             peak = impulses.pair_constants[uint64(pairs.kind[p]) * _KINDS + uint64(PEAK)]
             note_peak(peaks, uint64(pairs.i[p]), -chunk[_SPEED + c] * peak, normal)
@@ -229,18 +283,18 @@ def note_peak(peaks: Any, i: int, force: float, impulse: float) -> None:
 
 @part
 def _book(
-    ledger: Any, work: Any, impulses: Any, pairs: PairImpulses, chunk: F8, start: int, first: int, count: int
+    ledger: Any, work: Any, impulses: Any, pairs: PairImpulses, chunk: F8, listed: I8, start: int, count: int
 ) -> None:
     """Book the impacts of a chunk in the energy ledger. start: first pair of the colour."""
     if work is None:
         return
     for c in range(count):
         if chunk[_ACT + c] > 1.0:
-            p = start + first + c
+            p = listed[c]
             kind = int(pairs.kind[p]) * CONSTANTS
             mass, turn = impulses.pair_constants[kind + MASS], impulses.pair_constants[kind + TURN]
             slip, along = _slip(chunk, c), chunk[_CHANGE_TURN + c]
-            unit = pair_unit(ledger, first + c)
+            unit = pair_unit(ledger, p - start)
             book_impact(ledger, unit, chunk[_NORMAL + c], along, chunk[_SPEED + c], slip, mass, turn)
             x, y = chunk[_CHANGE_X + c], chunk[_CHANGE_Y + c]
             note_impact(work, impulses.body, int(pairs.i[p]), -1.0, x, y, along)
@@ -262,9 +316,9 @@ def _load(
     impulses: Any,
     pairs: PairImpulses,
     chunk: F8,
+    listed: I8,
     h: float,
     last: bool,
-    first: int,
     count: int,
 ) -> None:
     """Note loads by impacts and, in the last sweep, by pressed contacts."""
@@ -273,7 +327,7 @@ def _load(
     for c in range(count):
         act, normal = chunk[_ACT + c], chunk[_NORMAL + c]
         if act > 1.0 or (last and normal > 0.0):
-            p = first + c
+            p = listed[c]
             i, j, kind = int(pairs.i[p]), int(pairs.j[p]), int(pairs.kind[p]) * CONSTANTS
             along, x, y = _total(chunk, c)
             before = _slip(chunk, c)

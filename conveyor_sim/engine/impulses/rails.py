@@ -25,7 +25,7 @@ from conveyor_sim.engine.impulses.constants import (
 )
 from conveyor_sim.engine.impulses.law import visit
 from conveyor_sim.engine.impulses.loads import note_blow, note_pressed
-from conveyor_sim.engine.impulses.pairs import note_peak
+from conveyor_sim.engine.impulses.pairs import FARTHER, NEARER, note_peak
 from conveyor_sim.engine.impulses.runs import sleeps
 from conveyor_sim.engine.impulses.work import book_impact, note_impact
 from conveyor_sim.engine.observers.damage import rail_bin, wear
@@ -107,6 +107,9 @@ def _visit(
     nx, ny = (nx, ny) if near else (1.0, 0.0)
     gap = 0.5 * world.settings.skin - overlap if near else FAR
     vx, vy = -body[b + 2], -body[b + 3]
+    idle = rows[row] == 0.0 and rows[row + 1] == 0.0 and rows[row + 2] == 0.0 and rows[row + 3] == 0.0
+    if idle and gap > FARTHER + h * NEARER * (abs(vx) + abs(vy)):
+        return
     slip = vy * nx - vx * ny - body[b + 4]
     table = impulses.rail_constants
     kind = CONSTANTS * (world.bottles.type[i] * world.settings.rail_materials + material)

@@ -15,6 +15,12 @@ def bucket_of(cx: int, cy: int, buckets: int) -> int:
 
 
 @part
+def number_of(cx: int, cy: int) -> int:
+    """Return a number that no other cell has."""
+    return (cx << 32) + cy
+
+
+@part
 def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
     """Sort the occupied slots by hashed cell (counting sort)."""
     buckets = hood.bucket.size - 1
@@ -33,4 +39,9 @@ def sort_into_cells(bottles: Bottles, hood: Neighbourhood, cell: float) -> None:
         if bottles.id[i] >= 0:
             b = bucket_of(hood.cell[i, 0], hood.cell[i, 1], buckets)
             hood.bucket[b] -= 1
-            hood.order[hood.bucket[b]] = i
+            place = hood.bucket[b]
+            hood.order[place] = i
+            hood.sorted_x[place] = bottles.x[i]
+            hood.sorted_y[place] = bottles.y[i]
+            hood.sorted_radius[place] = bottles.radius[i]
+            hood.sorted_cell[place] = number_of(hood.cell[i, 0], hood.cell[i, 1])

@@ -10,15 +10,15 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import BottleList, Near
+from conveyor_sim.engine.arrays.types import I4
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.impulses.carry import restore_near, store_near
-from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.rails.poses import list_near_axes
 from conveyor_sim.engine.threads.workers import UNIT
 
 
 @part
-def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, margin: float) -> int:
+def list_near_segments(bottles: Bottles, grid: Any, homes: I4, segments: Any, near: Any, margin: float) -> int:
     """List the straight rail pieces within radius + margin of each bottle; return the number of entries needed."""
     if segments is None:
         return 0
@@ -27,7 +27,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        home = homes[i]
         if home < 0:
             continue
         reach = bottles.radius[i] + margin
@@ -51,7 +51,7 @@ def list_near_segments(bottles: Bottles, grid: Any, segments: Any, near: Any, ma
 
 
 @part
-def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: float) -> int:
+def list_near_arcs(bottles: Bottles, grid: Any, homes: I4, arcs: Any, near: Any, margin: float) -> int:
     """List the arcs within radius + margin of each bottle; return the number of entries needed."""
     if arcs is None:
         return 0
@@ -60,7 +60,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        home = homes[i]
         if home < 0:
             continue
         reach = bottles.radius[i] + margin
@@ -81,7 +81,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, arcs: Any, near: Any, margin: fl
 
 
 @part
-def list_near_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin: float) -> int:
+def list_near_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any, margin: float) -> int:
     """List the bodies whose sweep is within radius + margin of each bottle, and the axes of these bodies.
 
     Return the number of entries needed. near: None if bottles pass through bodies; no body is near a bottle then.
@@ -90,19 +90,19 @@ def list_near_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin
         return 0
     for b in range(moving.is_near.size):
         moving.is_near[b] = 0
-    count = _list_bodies(bottles, grid, moving, near, margin)
+    count = _list_bodies(bottles, grid, homes, moving, near, margin)
     list_near_axes(moving)
     return count
 
 
 @part
-def _list_bodies(bottles: Bottles, grid: Any, moving: Any, near: Any, margin: float) -> int:
+def _list_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any, margin: float) -> int:
     if near is None:
         return 0
     count = 0
     for i in range(bottles.x.size):
         near.start[i] = min(count, near.piece.size)
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        home = homes[i]
         if home < 0:
             continue
         reach = bottles.radius[i] + margin

@@ -6,13 +6,15 @@ It is sorted by slot, so that sums over it, and hence the bits of a run, do not 
 
 from typing import Any
 
+from numba import uint64
+
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.contacts import ContactLaw, Pairs
 from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.types import I8, U4
 from conveyor_sim.engine.compiler.compile import kernel, part, written
 from conveyor_sim.engine.impulses.carry import store_pairs
-from conveyor_sim.engine.lists.cells import bucket_of, sort_into_cells
+from conveyor_sim.engine.lists.cells import bucket_of, number_of, sort_into_cells
 
 
 @part
@@ -36,27 +38,34 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
         for cx in range(hood.cell[i, 0] - 1, hood.cell[i, 0] + 2):
             for cy in range(hood.cell[i, 1] - 1, hood.cell[i, 1] + 2):
                 b = bucket_of(cx, cy, buckets)
-                for entry in range(hood.bucket[b], hood.bucket[b + 1]):
+                number = number_of(cx, cy)
+                for entry in range(uint64(hood.bucket[b]), uint64(hood.bucket[b + 1])):
                     j = hood.order[entry]
-                    if j <= i or hood.cell[j, 0] != cx or hood.cell[j, 1] != cy:
-                        continue
-                    dx = bottles.x[j] - bottles.x[i]
-                    dy = bottles.y[j] - bottles.y[i]
-                    reach = bottles.radius[i] + bottles.radius[j] + skin
-                    if dx * dx + dy * dy < reach * reach:
-                        if count < capacity:
-                            k = count
-                            while k > first and pairs.j[k - 1] > j:
-                                pairs.j[k] = pairs.j[k - 1]
-                                k -= 1
-                            pairs.j[k] = j
-                            pairs.i[count] = i
-                        count += 1
+                    dx = hood.sorted_x[entry] - bottles.x[i]
+                    dy = hood.sorted_y[entry] - bottles.y[i]
+                    reach = bottles.radius[i] + hood.sorted_radius[entry] + skin
+                    near = (dx * dx + dy * dy < reach * reach) & (hood.sorted_cell[entry] == number)
+                    # Most candidates are none, in no order, so a branch would often be predicted wrongly.
+                    pairs.j[min(count, capacity - 1)] = j
+                    count += near & (j > i)
+        _sort(pairs, i, first, min(count, capacity))
     pairs.used[0] = min(count, capacity)
     _fill_radii(pairs, pairs.reach, bottles)
     if count <= capacity:
         _restore_springs(pairs, pairs.spring)
     return count
+
+
+@part
+def _sort(pairs: Pairs, i: int, first: int, end: int) -> None:
+    """Sort the pairs of bottle i, which are first to end, by their second bottle."""
+    for p in range(first, end):
+        pairs.i[p] = i
+        j, k = pairs.j[p], p
+        while k > first and pairs.j[k - 1] > j:
+            pairs.j[k] = pairs.j[k - 1]
+            k -= 1
+        pairs.j[k] = j
 
 
 @kernel

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.lists import StaticGrid
+from conveyor_sim.engine.arrays.types import I4
 from conveyor_sim.engine.compiler.compile import part
 
 MOST_CELLS = 250_000
@@ -63,7 +65,16 @@ def build_static_grid(
 
 
 @part
-def static_cell(grid: Any, x: float, y: float) -> int:
+def find_homes(bottles: Bottles, grid: Any, home: I4) -> None:
+    """Write the cell of the static grid under each bottle, -1 for free slots and bottles outside."""
+    if grid is None:
+        return
+    for i in range(bottles.x.size):
+        home[i] = _cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+
+
+@part
+def _cell(grid: Any, x: float, y: float) -> int:
     """Return the cell of the static grid under a point; -1 outside, where nothing of the plant is near."""
     if not (x >= grid.x and y >= grid.y):
         return -1

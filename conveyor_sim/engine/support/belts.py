@@ -6,9 +6,9 @@ from typing import Any
 
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.support import Belts
+from conveyor_sim.engine.arrays.types import I4
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.lists.near import end_list
-from conveyor_sim.engine.lists.static_grid import static_cell
 from conveyor_sim.engine.support.sector import span_distance
 from conveyor_sim.engine.threads.workers import UNIT
 
@@ -66,7 +66,7 @@ def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tup
 
 
 @part
-def list_belts(bottles: Bottles, grid: Any, belts: Any, ring: Any, floor: int, margin: float) -> int:
+def list_belts(bottles: Bottles, grid: Any, homes: I4, belts: Any, ring: Any, floor: int, margin: float) -> int:
     """Store the belt that covers a base and the `margin` (m) around it, or list candidates. Return their number."""
     if belts is None:
         return 0
@@ -77,9 +77,8 @@ def list_belts(bottles: Bottles, grid: Any, belts: Any, ring: Any, floor: int, m
             belts.uncertain.first[i // UNIT] = uncertain
         belts.start[i] = min(count, belts.candidate.size)
         belts.certain[i] = floor
-        home = static_cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
-        if home >= 0:
-            count = _list_candidates(i, bottles, grid, belts, margin + _base_radius(ring, i), count)
+        if homes[i] >= 0:
+            count = _list_candidates(i, bottles, grid, homes[i], belts, margin + _base_radius(ring, i), count)
         if belts.certain[i] < 0:
             belts.uncertain.bottle[uncertain] = i
             uncertain += 1
@@ -96,8 +95,8 @@ def _base_radius(ring: Any, i: int) -> float:
 
 
 @part
-def _list_candidates(i: int, bottles: Bottles, grid: Any, belts: Belts, margin: float, count: int) -> int:
-    first, home = count, static_cell(grid, bottles.x[i], bottles.y[i])
+def _list_candidates(i: int, bottles: Bottles, grid: Any, home: int, belts: Belts, margin: float, count: int) -> int:
+    first = count
     # The last listed belt carries: the grid lists them in that order.
     for entry in range(grid.belt_start[home], grid.belt_start[home + 1]):
         h = grid.belt[entry]

@@ -44,7 +44,17 @@ def workers(size: int) -> tuple[Worker, ...]:
     """Return `size` workers of one group."""
     sync, callees = np.zeros(SYNC_SIZE, np.int64), np.zeros(2, np.int64)
     return tuple(
-        Worker(rank, size, sync, _gathered(), _rail_contacts(), empty_history(), np.zeros(COLUMNS * CHUNK), callees)
+        Worker(
+            rank,
+            size,
+            sync,
+            _gathered(),
+            _rail_contacts(),
+            empty_history(),
+            np.zeros(COLUMNS * CHUNK),
+            np.zeros(CHUNK, np.int64),
+            callees,
+        )
         for rank in range(size)
     )
 

@@ -121,10 +121,12 @@ class DriveDevice(SetpointDevice):
         if name == self._speed_command:
             super().command(name, value, now)
             return
-        self.wake()
         what = name.removeprefix(f"{self.name}/")
+        if what == "run" and (value != 0.0) == self.run:
+            return
+        self.wake()
         if what == "run":
-            if value != 0.0 and not self.run:
+            if value != 0.0:
                 self.start()
             self.run = value != 0.0
         elif what == "reverse":

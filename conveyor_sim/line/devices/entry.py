@@ -2,11 +2,10 @@
 """Entry of bottles: free space for them, and bad bottles among them."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.physics.state import State
@@ -31,9 +30,9 @@ class BottleEntry:
     speed: float
     """Speed, m/s."""
 
-    def has_room(self, state: State, x: float, y: float) -> bool:
-        """Return True if a bottle at (x, y) m would touch neither a bottle nor a moving rail in its present place."""
-        return has_room(state, x, y, self.radius)
+    def has_room(self, state: State, places: Sequence[XY]) -> bool:
+        """Return True if bottles at places (m) would touch neither a bottle nor a moving rail (`has_room`)."""
+        return has_room(state, places, self.radius)
 
     def enter(self, state: State, x: float, y: float, turn: float = 0.0) -> int:
         """Add a bottle at (x, y) m, its direction turned by `turn` (rad), and return its id."""
@@ -45,23 +44,20 @@ def velocity(speed: float, direction: float) -> XY:
     return speed * math.cos(direction), speed * math.sin(direction)
 
 
-def has_room(state: State, x: float, y: float, radius: float) -> bool:
-    """Return True if a bottle at (x, y) m would touch neither a bottle nor a moving rail in its present place."""
-    bottles = state.world.bottles
-    near = (bottles.x - x) ** 2 + (bottles.y - y) ** 2 < (bottles.radius + radius - CLEAR) ** 2
-    if bool((near & (bottles.id >= 0)).any()):
+def has_room(state: State, places: Sequence[XY], radius: float) -> bool:
+    """Return True if bottles at places (m) would touch neither a bottle nor a moving rail in its present position."""
+    bottles, points = state.world.bottles, np.array(places)
+    reach, low, high = bottles.radius + radius, points.min(axis=0), points.max(axis=0)
+    beside = (bottles.x >= low[0] - reach) & (bottles.x <= high[0] + reach)
+    beside &= (bottles.y >= low[1] - reach) & (bottles.y <= high[1] + reach) & (bottles.id >= 0)
+    slots = np.flatnonzero(beside)
+    dx, dy = bottles.x[slots, None] - points[:, 0], bottles.y[slots, None] - points[:, 1]
+    if bool((dx**2 + dy**2 < (bottles.radius[slots, None] + radius - CLEAR) ** 2).any()):
         return False
-    place, moving = np.array([[x, y]]), state.world.moving
-    if moving is None or not _is_near(moving.sweep, place, radius):
+    if state.world.moving is None:
         return True
-    pieces = [piece for rail in state.moving_rails() for piece in rail.pieces]
-    return all(float(piece.distance(place)[0]) >= radius - CLEAR for piece in pieces)
-
-
-def _is_near(boxes: NDArray[np.float64], place: NDArray[np.float64], reach: float) -> bool:
-    """Return True if a place (1, 2) m is within a distance (m) of any of the boxes that bodies sweep, (B, 4)."""
-    inside = (boxes[:, :2] - reach <= place) & (place <= boxes[:, 2:] + reach)
-    return bool(inside.all(axis=1).any())
+    pieces = [piece for rail in state.bodies_near(low - radius, high + radius) for piece in rail.pieces]
+    return all(float(piece.distance(points).min()) >= radius - CLEAR for piece in pieces)
 
 
 class Scattering:

@@ -219,7 +219,7 @@ class InfeedDevice(Device, Scattering, Switching):
 
     def _enter(self, now: ScanContext, ahead: float) -> bool:
         x, y = self.place(ahead)
-        if not self._entry.has_room(now.state, x, y):
+        if not self._entry.has_room(now.state, [(x, y)]):
             return False
         self.last = self._entry.enter(now.state, x, y, self.deflection)
         self.quality.judge(self.last, now)

@@ -31,7 +31,7 @@ class SpillDevice(Device):
 
     def feed(self, now: ScanContext) -> None:
         """Drop the bottles that are due."""
-        while self.due and self._entry.has_room(now.state, *self._spill.position):
+        while self.due and self._entry.has_room(now.state, [self._spill.position]):
             self._entry.enter(now.state, *self._spill.position)
             self.due -= 1
             self.fed += 1

@@ -75,7 +75,7 @@ class SourceDevice(MachineDevice, Scattering, Switching):
         """Return True if a layer or bottle can be set down at places (m), and its pusher is retracted."""
         if self._pusher is not None and not self._pusher.is_home:
             return False
-        return all(self._entry.has_room(now.state, *place) for place in places)
+        return self._entry.has_room(now.state, places)
 
     def counts(self) -> tuple[int, int, int]:
         """Return fed bottles, and bad ones among them."""

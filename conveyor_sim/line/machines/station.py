@@ -178,7 +178,7 @@ class ProcessingDevice(BottleWork, TakingDevice, Scattering):
         """
         place, before = self.place(), now.state.held[bottle][0]
         after = self.type_after(before)
-        if not has_room(now.state, *place, self._radii[after]):
+        if not has_room(now.state, [place], self._radii[after]):
             self.blocked_ticks += 1
             return BLOCKED
         if self.goes_on():

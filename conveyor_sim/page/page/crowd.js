@@ -9,7 +9,8 @@ export class Crowd {
     this.stamps = new WeakMap();
   }
 
-  begin(width, height) {
+  begin(...size) {
+    const [width, height] = size.map((side) => Math.max(side, 1)); // a plan without room has no image otherwise
     if (this.canvas.width !== width || this.canvas.height !== height || !this.data) {
       [this.canvas.width, this.canvas.height] = [width, height];
       this.context = this.canvas.getContext("2d");

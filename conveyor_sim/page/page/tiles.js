@@ -37,7 +37,7 @@ export class Tiles {
           return part;
         }));
       return element("article", { class: "tile" },
-        element("h3", { title: name }, name.replace("machines/", "")),
+        element("h3", { title: name }, name.replace(/^(machines|carousels)\//, "")),
         row.oee === null ? null : element("div", { class: "oee" }, element("strong", {}, inPercent(row.oee)), element("span", {}, "OEE")),
         element("dl", {},
           ...[["availability", inPercent(row.availability)], ["effectiveness", inPercent(row.effectiveness)], ["quality", inPercent(row.quality)],

@@ -196,9 +196,12 @@ export class Trends {
     };
     context.save();
     const { recording } = this.view;
-    const given = story.data.readback.filter(([, , , writer]) => writer !== "scene");
+    // Values that a controller displays on the panel change all the time, and would hide the other marks.
+    const shown = (place) => /^panel\/.*\/write$/.test(recording.head.commands[place]);
+    const given = story.data.readback.filter(([, place, , writer]) => writer !== "scene" && !shown(place));
+    const short = (value) => (Number.isInteger(value) ? value : +value.toPrecision(4));
     const marks = [
-      ...given.map(([time, place, value]) => ({ time, kind: "command", text: `${recording.head.commands[place].split("/").slice(-2).join("/")} = ${value}` })),
+      ...given.map(([time, place, value]) => ({ time, kind: "command", text: `${recording.head.commands[place].split("/").slice(-2).join("/")} = ${short(value)}` })),
       ...story.marks,
     ].filter(({ time }) => time >= from && time <= to).sort((one, other) => one.time - other.time);
     for (const { time, kind } of marks) line(time, MARKS[kind] ?? colours.muted, kind === "command" ? [3, 3] : [6, 3]);

@@ -264,6 +264,18 @@ class State:
             return ()
         return self.model.plant.moving_at(moving.position.tolist(), moving.lag.tolist())
 
+    def bodies_near(self, low: NDArray[np.float64], high: NDArray[np.float64]) -> tuple[RailShape, ...]:
+        """Return the bodies that are present and whose sweep meets a box (m), each as a rail, at their positions.
+
+        low, high: corners of the box, (2,).
+        """
+        moving = self.world.moving
+        if moving is None:
+            return ()
+        near = ((moving.sweep[:, :2] <= high) & (low <= moving.sweep[:, 2:])).all(axis=1)
+        only = np.flatnonzero(near).tolist()
+        return self.model.plant.moving_at(moving.position.tolist(), moving.lag.tolist(), only) if only else ()
+
     def rails(self) -> tuple[RailShape, ...]:
         """Return all rails at their present positions: those at rest by number, then bodies."""
         return (*self.model.plant.rails_at_rest, *self.moving_rails())

@@ -56,7 +56,10 @@ SCRATCH: Mapping[str, str] = {
     "riding.": "of one call of an integrator",
     **dict.fromkeys(("impulses.pair_constants", "impulses.rail_constants"), "of one call of an integrator"),
     **dict.fromkeys((f"impulses.{name}" for name in SUBSTEP), "of one substep of the method of impulses"),
-    **dict.fromkeys(("impulses.mask", "pairs.impulse.next"), "of one rebuild of the lists"),
+    **dict.fromkeys(
+        ("impulses.mask", "impulses.group", "pairs.impulse.next", "neighbourhood.home", "neighbourhood.sorted_"),
+        "of one rebuild of the lists",
+    ),
     **dict.fromkeys(
         (f"impulses.sleep.{name}" for name in ("first_run", "run_", "mark", "sum", "root", "noise")),
         "of one tick",
@@ -103,6 +106,9 @@ TIED: Mapping[str, tuple[str, ...]] = {
     "near_arcs.springs.": ("near_arcs.start", "near_arcs.piece"),
 }
 """Arrays of tangential springs and of impulses, which are state, and the lists whose entries they belong to."""
+
+IN_REBUILDS = (".kept", ".kept_i", ".kept_j", ".kept_bottle", ".kept_piece", ".next")
+"""Ends of the names of arrays among those that hold something only while lists are rebuilt, so not between ticks."""
 
 BETWEEN_TICKS = (
     *(f"bottles.{name}" for name in ("id", "type", "radius", "inverse_mass", "weight")),
@@ -155,7 +161,7 @@ def tick_arrays(world: World) -> Arrays:
     names = {name for name in state_arrays(world) if not name.startswith((*UNCHECKED, *BETWEEN_TICKS))}
     for prefix, lists in TIED.items():
         if springs := {name for name in arrays if name.startswith(prefix)}:
-            names |= {*springs, *lists}
+            names |= {*(name for name in springs if not name.endswith(IN_REBUILDS)), *lists}
     return {name: array for name, array in arrays.items() if name in names}
 
 

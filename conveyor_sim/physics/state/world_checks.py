@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.impulses import MOST_PRESSED
+from conveyor_sim.engine.arrays.impulses import GROUPS, MOST_PRESSED
 from conveyor_sim.engine.arrays.moving import HELD, ON_PROFILE
 from conveyor_sim.engine.arrays.world import World
 from conveyor_sim.engine.contact.slots import WIDTH
@@ -77,6 +77,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "neighbourhood.stale": (0, 0),
         "neighbourhood.bucket": (0, slots),
         "neighbourhood.order": (0, slots - 1),
+        "neighbourhood.home": (-1, 0 if world.grid is None else world.grid.columns * world.grid.rows - 1),
         "probe.bottle": (0, slots - 1),
         "probe.other": (0, max(slots, len(model.plant.rails)) - 1),
         "probe.due": (0, 1),
@@ -105,6 +106,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
         "riding.progress": (STEPPED, PLANNED),
         "impulses.anew": (0, 1),
         "impulses.mask": (0, 2**63 - 1),
+        "impulses.group": (-1, GROUPS - 2),
         "impulses.sleep.asleep": (0, 1),
         "impulses.sleep.island": (0, slots - 1),
         "impulses.sleep.quiet": (0, LONG),
@@ -177,7 +179,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
 
 def indices(arrays: Arrays) -> set[str]:
     """Return the names of the integer arrays that must lie in a range. Others are only compared."""
-    free = ("neighbourhood.cell", "damage.impacts.")
+    free = ("neighbourhood.cell", "neighbourhood.sorted_cell", "damage.impacts.")
     return {name for name, array in arrays.items() if array.dtype.kind in "iu" and not name.startswith((*FIXED, *free))}
 
 

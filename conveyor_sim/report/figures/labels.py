@@ -21,6 +21,8 @@ from conveyor_sim.scene.geometry import BeltShape, named_surfaces
 _Z: Final = 8.0
 _CELL: Final = 4.0  # pixels of the map of what is taken
 _GAPS: Final = (7.0, 24.0)  # pixels between a name and what it names
+_FAR: Final = (44.0, 68.0, 92.0, 116.0, 140.0)  # the same, with a line from the name to what it names
+_FREE: Final = 0.02  # largest share of a name that may lie on other names
 _ALONG: Final = (0.5, 0.42, 0.58, 0.34, 0.66, 0.26, 0.74, 0.18, 0.82, 0.1, 0.9, 0.03, 0.97)
 _COMPASS: Final = np.arange(8) * np.pi / 4
 _AROUND: Final = np.stack([np.cos(_COMPASS), np.sin(_COMPASS)], axis=1)
@@ -30,7 +32,8 @@ _AROUND: Final = np.stack([np.cos(_COMPASS), np.sin(_COMPASS)], axis=1)
 class Label:
     """A name to place: `anchors` (k, 2) in m, best first, each with the direction `outward` (k, 2) away from it.
 
-    `on_belt`, from 0 to 1, says how bad it is to cover the plain area of a belt.
+    `on_belt`, from 0 to 1, says how bad it is to cover the plain area of a belt. `far`: in a crowd, the name may stand
+    far from its anchor, joined to it by a line.
     """
 
     text: str
@@ -39,6 +42,7 @@ class Label:
     anchors: Floats
     outward: Floats
     on_belt: float = 1.0
+    far: bool = True
 
 
 def belt_labels(plant: StaticGeometry, speeds: Floats) -> list[Label]:
@@ -64,7 +68,9 @@ def rail_labels(plant: StaticGeometry) -> list[Label]:
         leg = np.clip(np.searchsorted(reach, wanted) - 1, 0, len(line) - 2)
         ahead = line[leg + 1] - line[leg]
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.hypot(*ahead.T)[:, None]
-        labels.append(Label(rail.name, style.MUTED, 7.5, np.concatenate([at, at]), np.concatenate([left, -left]), 0.2))
+        labels.append(
+            Label(rail.name, style.MUTED, 7.5, np.concatenate([at, at]), np.concatenate([left, -left]), 0.2, far=False)
+        )
     return labels
 
 
@@ -107,7 +113,8 @@ def _beyond(ends: Floats) -> tuple[Floats, Floats]:
 def place(ax: Axes, labels: Sequence[Label], plant: StaticGeometry, circles: Floats | None = None) -> None:
     """Put each label at the anchor where it covers the least, in the given order; `circles` (n, 2) in m are bottles.
 
-    The axes must have their final limits; the figure is laid out here.
+    A label that would cover another one stands farther away, with a line to its anchor, or is left out. The axes must
+    have their final limits; the figure is laid out here.
     """
     figure = ax.figure
     assert isinstance(figure, Figure)
@@ -116,6 +123,7 @@ def place(ax: Axes, labels: Sequence[Label], plant: StaticGeometry, circles: Flo
     box = ax.get_window_extent()
     columns, rows = int(box.width // _CELL) + 1, int(box.height // _CELL) + 1
     lines, areas = _taken(ax, plant, circles, columns, rows, box.x0, box.y0)
+    names = np.zeros_like(lines)
     to_data = ax.transData.inverted()
     for label in labels:
         text = ax.text(
@@ -136,17 +144,28 @@ def place(ax: Axes, labels: Sequence[Label], plant: StaticGeometry, circles: Flo
         size = np.array([extent.width, extent.height])
         anchors = ax.transData.transform(label.anchors) - (box.x0, box.y0)
         reach = 0.5 * np.abs(label.outward) @ size
-        centres = np.concatenate([anchors + (gap + reach)[:, None] * label.outward for gap in _GAPS])
-        low = np.floor((centres - 0.5 * size) / _CELL).astype(np.int64)
-        high = np.ceil((centres + 0.5 * size) / _CELL).astype(np.int64)
-        outside = (low < 0).any(axis=1) | (high[:, 0] > columns) | (high[:, 1] > rows)
-        low, high = low.clip(0), np.minimum(high, (columns, rows))
         taken = 5.0 * lines + label.on_belt * areas
-        covered = np.array([_mean(taken, *corners) for corners in zip(low, high, strict=True)])
-        best = int(np.argmin(covered + 10.0 * outside + 0.005 * np.arange(len(covered))))
+        for gaps in (_GAPS, _FAR) if label.far else (_GAPS,):
+            centres = np.concatenate([anchors + (gap + reach)[:, None] * label.outward for gap in gaps])
+            low = np.floor((centres - 0.5 * size) / _CELL).astype(np.int64)
+            high = np.ceil((centres + 0.5 * size) / _CELL).astype(np.int64)
+            outside = (low < 0).any(axis=1) | (high[:, 0] > columns) | (high[:, 1] > rows)
+            low, high = low.clip(0), np.minimum(high, (columns, rows))
+            covered = np.array([_mean(taken, *corners) for corners in zip(low, high, strict=True)])
+            best = int(np.argmin(covered + 10.0 * outside + 0.005 * np.arange(len(covered))))
+            free = _mean(names, low[best], high[best]) <= _FREE
+            if free:
+                break
+        if not free:
+            text.remove()
+            continue
         x, y = to_data.transform(centres[best] + (box.x0, box.y0))
         text.set_position((float(x), float(y)))
-        lines[low[best, 1] : high[best, 1], low[best, 0] : high[best, 0]] = 1.0
+        if gaps is _FAR:
+            anchor = label.anchors[best % len(anchors)]
+            ax.plot([anchor[0], x], [anchor[1], y], color=label.colour, linewidth=0.6, alpha=0.6, zorder=_Z - 1.0)
+        for cells in (lines, names):
+            cells[low[best, 1] : high[best, 1], low[best, 0] : high[best, 0]] = 1.0
 
 
 def _sides(shape: BeltShape) -> tuple[Floats, Floats]:

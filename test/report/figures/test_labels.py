@@ -54,3 +54,26 @@ def test_the_name_of_a_belt_is_not_written_on_another_belt(ax: Axes, plant: Stat
     for text in ax.texts:
         centre = text.get_position()
         assert not any(area.contains_point(centre) for area in areas)
+
+
+def test_in_a_crowd_names_are_joined_by_lines_or_left_out(ax: Axes, plant: StaticGeometry) -> None:
+    draw_plant(ax, plant, plant.speeds, Normalize(0.0, 1.0), 0.1)
+    ax.set_xlim(-3.5, 6.0)
+    ax.set_ylim(-2.0, 4.0)
+    labels = 12 * (belt_labels(plant, plant.speeds) + rail_labels(plant))
+    drawn = len(ax.lines)
+    place(ax, labels, plant)
+    assert len(plant.surfaces) + 2 < len(ax.texts) < len(labels)
+    boxes = [text.get_window_extent() for text in ax.texts]
+    far = 0
+    for box, text in zip(boxes, ax.texts, strict=True):
+        label = next(label for label in labels if label.text == text.get_text())
+        anchors = ax.transData.transform(label.anchors)
+        away = np.hypot(*(anchors - (0.5 * (box.x0 + box.x1), 0.5 * (box.y0 + box.y1))).T).min()
+        far += away > 0.5 * np.hypot(box.width, box.height) + 30.0
+    assert len(ax.lines) - drawn >= far > 0
+    for one, other in combinations(boxes, 2):
+        shared = max(0.0, min(one.x1, other.x1) - max(one.x0, other.x0)) * max(
+            0.0, min(one.y1, other.y1) - max(one.y0, other.y0)
+        )
+        assert shared < 0.1 * min(one.width * one.height, other.width * other.height)
