@@ -8,8 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from conveyor_sim.control.alarm import Alarm
-from conveyor_sim.control.recorded import PREFIX as PROGRAM
-from conveyor_sim.control.scan import ControlError, Controller, Inputs, LineTags, bind, declared_alarms
+from conveyor_sim.control.scan import PROGRAM, ControlError, Controller, Inputs, LineTags, bind, declared_alarms
 
 
 def in_cell(controller: Controller, cell: str) -> Controller:

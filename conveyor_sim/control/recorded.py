@@ -6,13 +6,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 
-from conveyor_sim.control.scan import ControlError
+from conveyor_sim.control.scan import PROGRAM, ControlError
 
 MOST = 1000
 """Largest number of recorded variables of a controller. Every scan records that many numbers."""
-
-PREFIX = "plc/"
-"""Prefix of a program's variables. Patterns may omit it."""
 
 _LISTED = 20
 
@@ -56,7 +53,7 @@ class RecordedVariables:
 
 def _fitting(pattern: str, known: Sequence[str]) -> list[str]:
     plain = pattern.lower().replace("[", "[[]")
-    names = [name for name in known if any(fnmatchcase(name.lower(), one) for one in (plain, PREFIX + plain))]
+    names = [name for name in known if any(fnmatchcase(name.lower(), one) for one in (plain, PROGRAM + plain))]
     if not names:
         listed = ", ".join(known[:_LISTED]) + (", ..." if len(known) > _LISTED else "")
         expected = f"a pattern of {listed}" if known else "a controller with variables"

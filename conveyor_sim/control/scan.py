@@ -31,6 +31,9 @@ def bind(controller: object, tags: LineTags) -> None:
 ALARMS = "alarms/"
 """Prefix of a key that is an alarm (0 or 1), not a command, in the answer of a scan."""
 
+PROGRAM = "plc/"
+"""Prefix of the variables of a program. Patterns may omit it."""
+
 ON = 0.5
 """Lowest value at which a bool, sent as 0 or 1, is on."""
 

@@ -17,8 +17,7 @@ from typing import Any, NoReturn
 from conveyor_sim.bag.input_log import InputLog, copier
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.bag.recorder import Recorder
-from conveyor_sim.control.recorded import PREFIX
-from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs
+from conveyor_sim.control.scan import ALARMS, PROGRAM, ControlError, Controller, Inputs
 from conveyor_sim.errors import CommandError, SimulationError
 from conveyor_sim.line.changeover import changeover
 from conveyor_sim.line.commands.authority import MODES
@@ -77,7 +76,7 @@ class Present(Inputs):
 
         Raise NoSuchSignal, which is a KeyError.
         """
-        if name[: len(PREFIX)].lower() == PREFIX and name not in self._signals:
+        if name[: len(PROGRAM)].lower() == PROGRAM and name not in self._signals:
             name = name.lower()
         value = super().__getitem__(name)
         self.read[name] = None

@@ -133,6 +133,15 @@ def test_a_list_too_short_is_told_and_grown() -> None:
     assert listed(state) == within(points, radii, state.model.settings.skin)
 
 
+def test_a_list_that_is_exactly_full_holds_all_pairs() -> None:
+    """Candidates that are no pairs come after the last pair; they must not take its place."""
+    state, points, radii = crowd(200, 0.5)
+    expected = within(points, radii, state.model.settings.skin)
+    state.world = state.world._replace(pairs=empty_pairs(state.model, len(expected)))
+    assert rebuild(lists_of(state.world))[0] == len(expected)
+    assert listed(state) == expected
+
+
 def plant() -> tuple[State, np.ndarray, list[np.ndarray], list[np.ndarray]]:
     """Return random rails, with the true distance of each bottle from each straight piece and each arc."""
     corners = np.cumsum(RANDOM.normal(0.0, 0.15, (60, 2)), axis=0)

@@ -9,8 +9,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.control.recorded import PREFIX, patterns
-from conveyor_sim.control.scan import ControlError, Inputs, LineTags
+from conveyor_sim.control.recorded import patterns
+from conveyor_sim.control.scan import PROGRAM, ControlError, Inputs, LineTags
 from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
@@ -200,7 +200,7 @@ def _rounding(kind: Type) -> Callable[[float], float] | None:
 
 def _plain(name: str) -> str:
     """Return a variable's name as the program has it."""
-    return name.lower().removeprefix(PREFIX)
+    return name.lower().removeprefix(PROGRAM)
 
 
 class _Shown(Mapping[str, float]):
@@ -210,12 +210,12 @@ class _Shown(Mapping[str, float]):
         self._program = program
 
     def __getitem__(self, name: str) -> float:
-        if not name.startswith(PREFIX):
+        if not name.startswith(PROGRAM):
             raise KeyError(name)
-        return self._program.variables[name.removeprefix(PREFIX)].number()
+        return self._program.variables[name.removeprefix(PROGRAM)].number()
 
     def __iter__(self) -> Iterator[str]:
-        return (PREFIX + name for name in self._program.variables)
+        return (PROGRAM + name for name in self._program.variables)
 
     def __len__(self) -> int:
         return len(self._program.variables)

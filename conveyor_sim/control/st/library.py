@@ -18,8 +18,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from conveyor_sim.control.recorded import PREFIX, patterns
-from conveyor_sim.control.scan import ALARMS, ControlError, Inputs, LineTags
+from conveyor_sim.control.recorded import patterns
+from conveyor_sim.control.scan import ALARMS, PROGRAM, ControlError, Inputs, LineTags
 from conveyor_sim.support.child_process import start_python
 from conveyor_sim.support.rounded_limit import at_limit
 
@@ -161,7 +161,7 @@ class CompiledProgram:
             variables.append((name, int(out)))
         self._call("bind", variables)
         self._limits = tags.limits
-        self._names = {tag: f"{PREFIX}{name}" for name, tag in self._tags.items()}
+        self._names = {tag: f"{PROGRAM}{name}" for name, tag in self._tags.items()}
         self._shown = dict.fromkeys(self._names.values(), 0.0)
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:

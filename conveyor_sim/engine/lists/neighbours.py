@@ -45,8 +45,10 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
                     dy = hood.sorted_y[entry] - bottles.y[i]
                     reach = bottles.radius[i] + hood.sorted_radius[entry] + skin
                     near = (dx * dx + dy * dy < reach * reach) & (hood.sorted_cell[entry] == number)
-                    # Most candidates are none, in no order, so a branch would often be predicted wrongly.
-                    pairs.j[min(count, capacity - 1)] = j
+                    # Most candidates are none, in no order, so a branch on `near` would often be predicted wrongly. In
+                    # a full list, a candidate must not replace the last pair.
+                    if count < capacity:
+                        pairs.j[count] = j
                     count += near & (j > i)
         _sort(pairs, i, first, min(count, capacity))
     pairs.used[0] = min(count, capacity)
