@@ -98,3 +98,13 @@ def test_the_failure_of_the_depalletiser_explains_the_low_supply(line: Lines) ->
     assert plant.alarms == {"machines/depalletiser/fault"}
     plant.eventually(lambda s: not s["machines/depalletiser/fault"], within=10.0)
     assert plant.signals["machines/depalletiser/running"]
+
+
+def test_every_line_of_a_hall_has_its_controller(line: Lines) -> None:
+    hall = line(FOLDER / "hall.yaml", {"bottles": []})
+    hall.attach(load(f"{FOLDER / 'hall.py'}:hall"))
+    hall.run_for(0.1)
+    hall.panel.press("line_3_start")
+    hall.run_for(1.7)
+    running = [hall.signals[f"belts/line_{number}_filled/running"] for number in range(10)]
+    assert running == [float(number == 3) for number in range(10)]
