@@ -108,3 +108,8 @@ def test_every_line_of_a_hall_has_its_controller(line: Lines) -> None:
     hall.run_for(1.7)
     running = [hall.signals[f"belts/line_{number}_filled/running"] for number in range(10)]
     assert running == [float(number == 3) for number in range(10)]
+    hall.panel.press("line_4_estop")
+    hall.run_for(0.1)
+    assert hall.signals["belts/line_3_filled/running"] == 1.0
+    hall.panel.press("line_3_estop")
+    hall.eventually(lambda s: s["belts/line_3_filled/speed"] == 0.0, within=1.0)

@@ -333,7 +333,7 @@ RELATIVE_ANGLES = ("from", "phase", "positions", "to")
 
 def test_the_tables_of_fields_cover_the_schema() -> None:
     """Fields that hold names or coordinates are known, so that a cell with them is renamed and placed."""
-    known_names = {*naming.REFERENCES, naming.TAG, *naming.OTHER_NAMES}
+    known_names = {*naming.REFERENCES, naming.TAG, naming.CELL, *naming.OTHER_NAMES}
     points = {*cell_coordinates.POINTS, *cell_coordinates.POINT_LISTS}
     for model in set(itertools.chain(models(Scene), models(SceneLayout))):
         for name, field in field_names(model).items():

@@ -104,7 +104,7 @@ class EmergencyStopDevice(Device):
         )
         self._power = setup.shared(PowerSupply, PowerSupply) if stop.cuts else None
         if self._power is not None:
-            self._power.add_stop(name, stop.cuts, stop.deceleration)
+            self._power.add_stop(name, stop.cuts, stop.deceleration, stop.cell)
         self._loads = " and ".join(stop.cuts)
         self._alarm = f"{name}/pressed"
         self.latched = False

@@ -23,25 +23,27 @@ class PowerSupply(Device):
         """Start with power, and without consumers."""
         super().__init__("power")
         self._cuts: dict[str, Sequence[Load]] = {}
+        self._cells: dict[str, str | None] = {}
         self._fed: dict[Load, list[Device]] = {"drives": [], "machines": []}
         self._deceleration = math.inf
         self.latched = []
         self.locked = []
 
-    def add_stop(self, name: str, cuts: Sequence[Load], deceleration: float | None) -> None:
-        """Add an emergency stop by its name. deceleration: of belts without power, m/s^2."""
+    def add_stop(self, name: str, cuts: Sequence[Load], deceleration: float | None, cell: str | None) -> None:
+        """Add an emergency stop by its name. deceleration: of belts without power, m/s^2. cell: as in the scene."""
         self._cuts[name] = cuts
+        self._cells[name] = cell
         if deceleration is not None:
             self._deceleration = deceleration
 
     def feeds(self, load: Load, device: Device) -> bool:
         """Connect a consumer, and return True if an emergency stop can take its power."""
         self._fed[load].append(device)
-        return any(load in cuts for cuts in self._cuts.values())
+        return any(self._takes(stop, load, device.name) for stop in self._cuts)
 
-    def is_off(self, load: Load) -> bool:
-        """Return True while an emergency stop takes the power of such consumers."""
-        return any(load in self._cuts[name] for name in self.latched)
+    def taken_by(self, load: Load, device: str) -> list[str]:
+        """Return the emergency stops that take the power of a consumer now."""
+        return [stop for stop in self.latched if self._takes(stop, load, device)]
 
     def holds(self, drive: str) -> bool:
         """Return True while a drive has no power, or awaits a start command."""
@@ -49,7 +51,7 @@ class PowerSupply(Device):
 
     def start(self, drive: str) -> None:
         """Unlock a drive at a start command, if it has power."""
-        if drive in self.locked and not self.is_off("drives"):
+        if drive in self.locked and not self.taken_by("drives", drive):
             self.locked.remove(drive)
 
     def coast(self, speed: float, interval: float) -> float:
@@ -59,17 +61,23 @@ class PowerSupply(Device):
     def cut(self, name: str, now: ScanContext) -> None:
         """Take power, because an emergency stop has latched."""
         self.latched.append(name)
-        if "drives" in self._cuts[name]:
-            self.locked = [drive.name for drive in self._fed["drives"]]
-            for drive in self._fed["drives"]:
+        for drive in self._fed["drives"]:
+            if self._takes(name, "drives", drive.name):
                 drive.wake()
-        if "machines" in self._cuts[name]:
-            for machine in self._fed["machines"]:
+                if drive.name not in self.locked:
+                    self.locked.append(drive.name)
+        for machine in self._fed["machines"]:
+            if self._takes(name, "machines", machine.name):
                 machine.cut_power(now)
 
     def restore(self, name: str) -> None:
         """Give power back, because an emergency stop was reset."""
         self.latched.remove(name)
+
+    def _takes(self, stop: str, load: Load, device: str) -> bool:
+        """Return True if an emergency stop takes the power of a consumer, such as machines/block_filler."""
+        cell = self._cells[stop]
+        return load in self._cuts[stop] and (not cell or device.partition("/")[2].startswith(f"{cell}_"))
 
     def restored(self, tick: int) -> None:
         """Check the restored attributes. Raise ValueError if they do not fit the line."""

@@ -53,7 +53,7 @@ class RejectDevice(Device):
 
     @property
     def _responds(self) -> bool:
-        return not self.stop and not (self._power is not None and self._power.is_off("machines"))
+        return not self.stop and not (self._power is not None and self._power.taken_by("machines", self.name))
 
     def rehearse(self, now: ScanContext) -> None:
         """Search the region."""

@@ -170,8 +170,9 @@ class MachineDevice(Device):
             return f"{name}: {COMMAND_TEXTS[command]} given while {self.name}/run is 0, expected 1 before"
         if self._failed and command == Command.UNHOLD:
             return f"{name}: Unhold given while it is not repaired, expected {self.name}/fault to be off"
-        if command == Command.CLEAR and self._power is not None and self._power.is_off("machines"):
-            return f"{name}: Clear given without power, expected {' and '.join(self._power.latched)} to be reset before"
+        stops = self._power.taken_by("machines", self.name) if self._power is not None else []
+        if command == Command.CLEAR and stops:
+            return f"{name}: Clear given without power, expected {' and '.join(stops)} to be reset before"
         return ""
 
     def cut_power(self, now: ScanContext) -> None:

@@ -27,6 +27,8 @@ REFERENCES: Mapping[str, tuple[str, ...]] = {
 """Fields that hold names of parts, with the fields of the scene in which these parts are."""
 TAG, ALARM_IDS = "tag", "suppressed_by"
 """Fields of an alarm that hold a path to a signal, and ids of alarms."""
+CELL = "cell"
+"""Field of an emergency stop that holds the name of a cell."""
 OTHER_NAMES = ("between", "bottle", "initial", "material", "name", "plate", "positions", "type", "types")
 """Fields that hold other names, without a prefix: bottle types, materials, sections of a conveyor, positions of a
 selector."""
@@ -56,12 +58,19 @@ class Prefix:
                 data[field] = {}
                 for name, part in parts.items():
                     new = self.name(name) if renames else name
-                    data[field][new] = self._part(part) if renames else part
+                    data[field][new] = self._stop(self._part(part)) if renames else part
                     sources.adopt((field, new), cell.sources, (field, name))
             else:
                 data[field] = self._part(parts) if field in LISTS else parts
                 sources.adopt((field,), cell.sources, (field,))
         return Fragment(sources, data)
+
+    def _stop(self, part: Any) -> Any:
+        """Return a part; an emergency stop of the cell cuts the cell, not the scene."""
+        if not isinstance(part, dict) or part.get("kind") != "emergency_stop":
+            return part
+        inner = part.get(CELL)
+        return {**part, CELL: self.name(inner) if inner else self._cell}
 
     def _part(self, value: Any) -> Any:
         if isinstance(value, list):

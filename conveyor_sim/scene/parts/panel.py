@@ -93,9 +93,19 @@ class EmergencyStop(PanelPart):
         "m/s^2",
         default=None,
     )
+    cell: Name | None = quantity(
+        "Cell whose drives and machines it cuts. Left out: those of the scene, or in the file of a cell those of the "
+        "cell.",
+        default=None,
+    )
 
     def problems(self, path: Path, others: Others) -> Iterator[Problem]:
-        """Yield problems of repeated loads, and of a deceleration that is missing, unused or different elsewhere."""
+        """Yield problems of repeated loads, a wrong cell, and a deceleration that is missing, unused or different."""
+        if self.cell and not any(
+            name.startswith(f"{self.cell}_") for field in ("belts", "drives", "machines") for name in others[field]
+        ):
+            text = f"{shown(self.cell)} given, expected a cell with belts, drives or machines"
+            yield Problem((*path, "cell"), text)
         if len(set(self.cuts)) < len(self.cuts):
             yield Problem((*path, "cuts"), f"{shown(list(self.cuts))} given, expected each once")
         place = (*path, "deceleration")

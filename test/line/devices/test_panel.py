@@ -47,6 +47,40 @@ def lined(panel: dict[str, Any] | None = None, **fields: Any) -> Simulation:
     )
 
 
+def test_an_emergency_stop_of_a_cell_cuts_its_drives_and_machines_only() -> None:
+    drive = {"drive": {"acceleration": 1.0}}
+    sim = simulation(
+        accuracy={"per_tick": 10},
+        base=base(0.4),
+        contacts=[contact(5000.0)],
+        panel={"estop": STOP, "a_estop": {**STOP, "cell": "a"}},
+        belts={"a_lane": belt(0.5, **drive), "ab_lane": belt(0.5, (0.0, 4.0), **drive)},
+        machines={"a_source": SOURCE, "ab_source": {**SOURCE, "position": [0.5, 4.0]}},
+        bottles=[bottle(0.0, 0.0, 0.5)],
+    )
+    parts = ("belts/a_lane/running", "belts/ab_lane/running", "machines/a_source/running", "machines/ab_source/running")
+    act(sim, a_estop__press=1.0)
+    sim.advance(5)
+    assert [read(sim, name) for name in parts] == [0.0, 1.0, 0.0, 1.0]
+    act(sim, estop__press=1.0)
+    sim.advance(5)
+    assert [read(sim, name) for name in parts] == [0.0, 0.0, 0.0, 0.0]
+    act(sim, estop__reset=1.0)
+    clear = float(Command.CLEAR)
+    sim.give(Input("test", "controller", "controller", SET, ("machines/a_source/cntrl_cmd",), (clear,)))
+    sim.give(Input("test", "controller", "controller", SET, ("machines/ab_source/cntrl_cmd",), (clear,)))
+    sim.advance()
+    refused, accepted = sim.take_outcomes()[-2:]
+    assert not refused.accepted and missing(refused.reason, "panel/a_estop") == []
+    assert accepted.accepted
+
+
+def test_an_emergency_stop_of_no_cell_is_refused() -> None:
+    with pytest.raises(SceneError, match="cell") as refusal:
+        lined({"estop": {**STOP, "cell": "elsewhere"}})
+    assert missing(str(refusal.value), "panel.estop.cell", "elsewhere") == []
+
+
 def act(sim: Simulation, kind: str = "operator", **values: float) -> CommandOutcome:
     """Give inputs of the panel ("start__press") by a kind of writer in one tick, and return the last result."""
     for name, value in values.items():
