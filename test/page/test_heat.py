@@ -132,7 +132,7 @@ def test_a_running_line_has_heat_maps(live: Live, open_page: Callable[[str], Any
     page.select_option("#heat", "density")
     page.select_option("#span", "whole")
     soon(page, lambda: top(" ".join(page.inner_text("#legend .heat").split()))[0] > 0.0, "the map has a scale")
-    assert "received data" in page.inner_text("#legend .heat")
+    soon(page, lambda: "received data" in page.inner_text("#legend .heat"), "the map is that of the received data")
 
 
 @pytest.mark.parametrize("width", [1010, 1100, 1200, 1280])
