@@ -161,7 +161,7 @@ def riders(simulation: Simulation) -> int:
 
 
 def sleepers(simulation: Simulation) -> set[int]:
-    """IDs of the bottles that sleep; none where nobody can sleep."""
+    """IDs of the bottles that sleep; none without the effect."""
     world = simulation._state.world
     if world.impulses is None or world.impulses.sleep is None:
         return set()
