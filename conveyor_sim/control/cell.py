@@ -16,7 +16,8 @@ def in_cell(controller: Controller, cell: str) -> Controller:
 
     controller: names tags as if the file of the cell were the scene: `belts/lane/speed`. cell: name of the cell; its
     lane is `belts/<cell>_lane/speed` in the scene. Only tags of the cell are visible to the controller. Alarms and
-    variables get the prefix too, so `together` accepts the same controller for several cells.
+    variables get the prefix too, so `together` accepts the same controller for several cells. Its `bind` raises
+    ControlError if the line has no such cell.
     """
     return _InCell(controller, f"{cell}_")
 

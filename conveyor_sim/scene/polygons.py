@@ -22,7 +22,7 @@ def inside(points: NDArray[np.float64], corners: Sequence[XY] | NDArray[np.float
 
 
 def boxes_meet(one: Sequence[XY] | NDArray[np.float64], other: Sequence[XY] | NDArray[np.float64]) -> bool:
-    """Return True if the boxes around two polygons have a common point: if not, the polygons have none."""
+    """Return True if the boxes around two polygons, (n, 2), have a common point: if not, the polygons have none."""
     first, second = np.asarray(one, dtype=np.float64), np.asarray(other, dtype=np.float64)
     after = (first.min(axis=0) > second.max(axis=0)).any()
     return not (after or (second.min(axis=0) > first.max(axis=0)).any())

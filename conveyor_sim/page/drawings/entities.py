@@ -16,6 +16,7 @@ from conveyor_sim.page.drawings.dxf_file import MOST_ENTITIES, metres_per_unit, 
 from conveyor_sim.page.drawings.pieces import DrawnPiece, arc, fitted
 from conveyor_sim.scene.types import COORDINATE_LIMIT, TOUCH, XY
 from conveyor_sim.support.files import FileError
+from conveyor_sim.support.printable import SENTENCE, printable
 
 _DEEPEST: Final = 16  # blocks in blocks
 _FLAT: Final = 1e-6  # m; a plan has no heights
@@ -268,7 +269,10 @@ class _Reader:
 
     def _spline(self, entity: Any, source: EntityRef) -> Stroke | str:
         """Return the line or arc that a spline follows, or the reason why it follows none."""
-        curve = list(entity.construction_tool().approximate(_SAMPLES))
+        try:
+            curve = list(entity.construction_tool().approximate(_SAMPLES))
+        except (ArithmeticError, ValueError, TypeError, IndexError) as error:  # those of ezdxf have no common base
+            return f"an invalid spline ({printable(error, SENTENCE)})"
         if max(point.z for point in curve) - min(point.z for point in curve) > _FLAT / self._scale:
             return "it rises, and a plan has no heights"
         points = [self._flat(source, None, point) for point in curve]

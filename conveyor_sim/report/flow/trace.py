@@ -47,6 +47,7 @@ class Takers:
     """Devices that take bottles, with their regions."""
 
     def __init__(self, regions: Sequence[tuple[Path, Sequence[XY]]]) -> None:
+        """Store the path of each device and the corners of its region, m."""
         self._regions = regions
         corners = [np.asarray(region) for _, region in regions]
         self._low = np.array([polygon.min(axis=0) for polygon in corners]).reshape(-1, 2)

@@ -106,6 +106,19 @@ def test_a_straight_spline_is_a_line_and_a_wavy_one_is_reported(run: Import) -> 
     assert source.entity == "SPLINE" and "mm beside the nearest arc" in reason
 
 
+@pytest.mark.parametrize("layer", ["AXES", "OTHER"])
+def test_an_invalid_spline_is_skipped_and_the_rest_is_read(run: Import, layer: str) -> None:
+    def draw(_: Any, space: Any) -> None:
+        space.add_line((0, 0), (2000, 0), **on("AXES"))
+        space.add_spline(**on(layer))
+        space.add_spline(**on(layer)).control_points = [(0, 0, 0)]
+
+    result = run(draw, AXES)
+    assert len(result.sections["conveyors"]) == 1
+    if layer == "AXES":
+        assert [reason.startswith("an invalid spline (") for _, reason in result.skipped] == [True, True]
+
+
 def test_blocks_without_attributes_are_named_by_the_nearest_text(run: Import) -> None:
     def draw(document: Any, space: Any) -> None:
         box = document.blocks.new("EYE")
