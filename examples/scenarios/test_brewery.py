@@ -32,7 +32,7 @@ SHORT = {
     },
     "zones": {"layer": {"full_at": 90}},
 }
-"""The line with few bottles, fast or short conveyors, small layers, a short stay in the pasteuriser and many bad labels."""
+"""The line with few bottles, fast or short conveyors, small layers, a short pasteurisation and many bad labels."""
 
 
 def test_the_line_starts_and_fills(line: Lines) -> None:
