@@ -78,6 +78,8 @@ class BottlingLine:
     """Signals whose sum is the number of bottles on the line."""
     formats: Sequence[Mapping[str, float]]
     """Commands by position of the selector."""
+    started: bool = False
+    """Run from the first scan."""
     remainder: float = 23.0
     """Largest number of bottles on an empty line, fewer than a case."""
     warning: int = 100
@@ -89,6 +91,10 @@ class BottlingLine:
     _waited: int = 0
     _ready: bool = True
     _start: bool = field(default=True)
+
+    def __post_init__(self) -> None:
+        if self.started:
+            self._step = LineStep.RUNNING
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return the commands of one scan."""
@@ -139,8 +145,12 @@ class BottlingLine:
         return LineStep.EMPTYING
 
 
-def brewery() -> Controller:
-    """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject."""
+def brewery(buffer: float = 9.0, started: bool = False) -> Controller:
+    """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject.
+
+    buffer: length of each wide conveyor behind the block, m, the scene's parameter. started: the line runs from the
+    first scan, without the start button.
+    """
     belts = ("supply", "spread", "filled", "leaving", "cold", "wide", "packing")
     cells = ("single", "label")
     line = BottlingLine(
@@ -158,6 +168,7 @@ def brewery() -> Controller:
             "zones/layer/bottles",
         ),
         formats=({"machines/depalletiser/cmd_bottle": 0.0}, {"machines/depalletiser/cmd_bottle": 1.0}),
+        started=started,
     )
     reject = TrackedReject(
         belt="label_lane",
@@ -168,13 +179,15 @@ def brewery() -> Controller:
         stroke=0.03,
         pulses_per_metre=2000.0,
     )
-    return together(line, v_curve(), reject)
+    return together(line, v_curve(buffer), reject)
 
 
-def v_curve() -> VCurve:
-    """Return the rates of the machines around the filler block of `brewery.yaml`."""
+def v_curve(buffer: float) -> VCurve:
+    """Return the rates of the machines around the filler block of `brewery.yaml`. Levels behind it suit its buffers."""
 
-    def neighbour(machine: str, zone: str, low: float, target: float, high: float) -> Neighbour:
+    def neighbour(machine: str, zone: str, *levels: float) -> Neighbour:
+        size = 1.0 if zone == "supply" else buffer / 9.0
+        low, target, high = (level * size for level in levels)
         return Neighbour(f"machines/{machine}/rate", Count(f"zones/{zone}/bottles"), low, target, high)
 
     return VCurve(
