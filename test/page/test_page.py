@@ -79,6 +79,23 @@ def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
     assert clock(page) == 24.0
 
 
+@pytest.mark.parametrize("clicked", ["#to_start", "#tab_events", "#panel_events .event >> nth=0"])
+def test_the_space_key_plays_after_a_click_on_a_button(page: Any, clicked: str) -> None:
+    page.click("#tab_events")
+    page.click(clicked)
+    settled(page)
+    before = clock(page)
+    press(page, "Space")
+    assert page.get_attribute("#play", "aria-label") == "Pause"
+    press(page, "Space")
+    assert page.get_attribute("#play", "aria-label") == "Play" and clock(page) >= before
+    page.keyboard.press("Tab")
+    page.focus("#back")
+    page.keyboard.press("Space")
+    settled(page)
+    assert clock(page) < max(before, 24.0) and page.get_attribute("#play", "aria-label") == "Play"
+
+
 def test_the_page_opens_before_what_failed_and_says_it_as_text(page: Any) -> None:
     assert clock(page) == pytest.approx(17.0, abs=0.05)
     assert page.inner_text("#notice") == "always: no more than 20 bottles <script>alert(3)</script>"
