@@ -135,7 +135,7 @@ def test_infeeds_beside_each_other_have_their_names_at_their_arrows(browser: Any
     with opened_page(browser, html, script=NOTE_TEXTS) as page:
         boxes = {name: box for name, *box in texts(page)}
         for name, y in (("right", -0.15), ("middle", 0.0), ("left", 0.15)):
-            left, top, right, bottom = boxes[name]
+            _, top, right, bottom = boxes[name]
             arrow_x, arrow_y = to_pixels(page, 0.1, y)
             assert right < arrow_x and top < arrow_y < bottom, name
 
