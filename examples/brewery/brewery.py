@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controller of brewery.yaml: start, stop and changeover of the line, the feeds of its combiners, V-curve and reject.
+"""Controller of brewery.yaml: start, stop and changeover of the line, its combiners, V-curve and reject.
 
 cd examples/brewery; conveyor-sim serve brewery.yaml --controller brewery.py:brewery --web
 
@@ -32,11 +32,29 @@ class LineStep(IntEnum):
 
 
 @dataclass(frozen=True)
-class Feed:
-    """Feed of a combiner: its belts stand while bottles back up to a photo-eye in the lane behind the combiner."""
+class Combiner:
+    """Combiner, slower while a queue behind it reaches the photo-eye `queued`, and standing while it reaches `full`."""
 
-    eye: str
-    belts: Sequence[str]
+    cell: str
+    supply: str
+    """Belt before the cell."""
+    speeds: tuple[float, float]
+    """Full speeds of this belt and of the feed, m/s."""
+    slower: float = 0.72
+    """Share of these speeds while a queue stands in the lane."""
+
+    def commands(self, inputs: Inputs, runs: bool) -> Mapping[str, float]:
+        """Return the commands of its belts in one scan."""
+        clear = inputs[f"photo_eyes/{self.cell}_full/blocked"] == 0.0
+        share = 1.0 if inputs[f"photo_eyes/{self.cell}_queued/blocked"] == 0.0 else self.slower
+        feed, chains = f"{self.cell}_feed", f"{self.cell}_chains"
+        return {
+            **{f"belts/{belt}/run": float(runs and clear) for belt in (self.supply, feed, chains)},
+            **{
+                f"belts/{belt}/cmd_speed": share * speed
+                for belt, speed in zip((self.supply, feed), self.speeds, strict=True)
+            },
+        }
 
 
 @dataclass
@@ -54,8 +72,8 @@ class BottlingLine:
     machines: Sequence[str]
     """Other machines."""
     belts: Sequence[str]
-    """Belts with a drive, except those of feeds and of the block."""
-    feeds: Sequence[Feed]
+    """Belts with a drive, except those of combiners and of the block."""
+    combiners: Sequence[Combiner]
     bottles: Sequence[str]
     """Signals whose sum is the number of bottles on the line."""
     formats: Sequence[Mapping[str, float]]
@@ -91,10 +109,8 @@ class BottlingLine:
         }
         for belt in self.belts:
             commands[f"belts/{belt}/run"] = float(runs)
-        for feed in self.feeds:
-            clear = inputs[f"photo_eyes/{feed.eye}/blocked"] == 0.0
-            for belt in feed.belts:
-                commands[f"belts/{belt}/run"] = float(runs and clear)
+        for combiner in self.combiners:
+            commands.update(combiner.commands(inputs, runs))
         for machine in self.machines:
             commands[f"machines/{machine}/run"] = float(runs)
         for machine in (self.source, *self.machines):
@@ -134,10 +150,7 @@ def brewery() -> Controller:
         source="depalletiser",
         machines=("rinser", "pasteuriser", "labeller", "packer"),
         belts=("spread", "filled", "leaving", "wide", "packing", *(f"{cell}_lane" for cell in cells)),
-        feeds=(
-            Feed("single_full", ("supply", "single_feed", "single_chains")),
-            Feed("label_full", ("cold", "label_feed", "label_chains")),
-        ),
+        combiners=(Combiner("single", "supply", (0.05, 0.12)), Combiner("label", "cold", (0.055, 0.12))),
         bottles=(
             *(f"belts/{belt}/bottles" for belt in (*belts, "block_infeed", "block_discharge")),
             *(f"belts/{cell}_{belt}/bottles" for cell in cells for belt in ("feed", "chains", "lane")),

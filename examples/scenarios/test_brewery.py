@@ -25,14 +25,14 @@ def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: 
 SHORT = {
     "parameters": {"dwell": 2.0},
     "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 8.2, -0.55, 10, 6)],
-    "conveyors": {belt: {"speed": 0.5} for belt in ("supply", "filled", "cold", "packing")},
+    "conveyors": {"filled": {"speed": 0.5}, "packing": {"speed": 0.5}, "cold": {"path": [{"straight": 2.0}]}},
     "machines": {
         "depalletiser": {"layer": {"rows": 6, "columns": 15, "pitch": 0.0675, "pusher": "sweep"}},
         "labeller": {"sets": {"label": {"share": 0.9}}},
     },
     "zones": {"layer": {"full_at": 90}},
 }
-"""The line with few bottles, fast wide conveyors, small layers, a short stay in the pasteuriser and many bad labels."""
+"""The line with few bottles, fast or short conveyors, small layers, a short pasteurisation and many bad labels."""
 
 
 def test_the_line_starts_and_fills(line: Lines) -> None:

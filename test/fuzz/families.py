@@ -70,6 +70,8 @@ class Family:
     axes: bool = False
     wheels: bool = False
     """Star wheels with carousels, screws, side belts, and the axes that turn them."""
+    each_wheel: bool = False
+    """At least one of each kind of wheel, so that all scenes have the same effects."""
     panel: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
@@ -172,7 +174,7 @@ CI_FAMILIES = (
     _PLAIN,
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
-    Family(rails=("segment", "arc"), wheels=True, panel=True, infeeds=True, ledger=True),
+    Family(rails=("segment", "arc"), wheels=True, each_wheel=True, panel=True, infeeds=True, ledger=True),
     replace(_PLAIN, integrator="impulses", damping=("normal",), drives=True, movers=True),
 )
 """Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

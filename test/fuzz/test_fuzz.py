@@ -45,7 +45,7 @@ short = settings(
 def test_whatever_the_scene(family: Family) -> None:
     ran = []
     # The seventh scene of impulses compiles another mixture of effects.
-    examples = 6 if family.integrator == "impulses" else 10 if family.sensors else 15
+    examples = 6 if family.integrator == "impulses" else 10
 
     @settings(short, max_examples=examples)
     @given(cases(family, beyond=False))

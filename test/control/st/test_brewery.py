@@ -73,6 +73,8 @@ def script(first: Mapping[str, float]) -> Iterator[Mapping[str, float]]:
         for name in eyes:
             if chance.random() < 0.02:
                 signals[name] = 1.0 - signals[name]
+        if 5300 <= scan < 5500:  # a start of the block without a queue, while the line empties
+            signals["photo_eyes/block_queued/blocked"] = 0.0
         for name in geared:
             signals[name] = float(chance.random() < 0.9)
         for name in faults:
@@ -124,6 +126,7 @@ def test_the_project_is_its_twin(line: FirstScan, expected: list[Mapping[str, fl
         ("line.st", "waited > SETTLE_TIME", "waited >= SETTLE_TIME"),
         ("line.st", "powered AND (ready OR reset_button)", "powered"),
         ("line.st", "bottles > REMAINDER", "bottles >= REMAINDER"),
+        ("line.st", "SEL(label_queued, 1.0, SLOWER) * 0.055", "SEL(single_queued, 1.0, SLOWER) * 0.055"),
         ("block.st", "queued OR empties", "queued"),
         ("reject.st", "1.5 * SCAN", "SCAN"),
         ("rates.st", "nearer := labeller.rate", "nearer := nominal"),
