@@ -34,7 +34,8 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
             self._stories: list[PageRecording] = []
             self._comparison: RecordingComparison | None = None
             if other is not None:
-                self._comparison = RecordingComparison(*(self._opened(bag, stack) for bag in self._bags), SERVED.story)
+                a, b = (self._opened(bag, stack) for bag in self._bags)
+                self._comparison = RecordingComparison(a, b, SERVED.story)
             self._block_lock, self._story_lock = threading.Lock(), threading.Lock()
             self._host = stack.enter_context(PageHost(self.answer, port))
             self._stack = stack.pop_all()
