@@ -207,9 +207,9 @@ def _simulation(bag: Bag) -> Simulation:
             f"{bag.path}: format 4 with implicit friction and {model.integrator}, expected another format, solver or "
             "integrator: this version evaluates the friction under bottles at another time of the step"
         )
-    if bag.format < 6 and model.sweeps:
+    if bag.format < 7 and model.sweeps:
         raise BagError(
-            f"{bag.path}: format {bag.format} with integrator {model.integrator}, expected format 6 or another "
+            f"{bag.path}: format {bag.format} with integrator {model.integrator}, expected format 7 or another "
             "integrator: this version solves the contacts of a step in another way"
         )
     for axis in model.plant.axes:

@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sleeping bottles: the same forces and positions as without, and every cause that wakes an island."""
 
+import math
+
 import numpy as np
 import pytest
 from asleep import asleep, awake_run, sleeping_file
-from scenes import MASS, belt, bottle, segment
+from scenes import MASS, belt, bottle, polyline, segment
 from swept import MU_BASE, G, crowd, file_of, forces_on, run
+
+from conveyor_sim.engine.impulses.sleep import BALANCE
+from conveyor_sim.simulation import Simulation
 
 DRAG = MU_BASE * MASS * G
 
@@ -41,6 +46,46 @@ def test_a_crowd_rests_where_it_rests_without_sleep() -> None:
     assert along[0] == pytest.approx(along[1], abs=0.01 * MU_BASE * weight)
     np.testing.assert_allclose(sims[0].bottles().x, sims[1].bottles().x, rtol=0.0, atol=5e-5)
     np.testing.assert_allclose(sims[0].bottles().y, sims[1].bottles().y, rtol=0.0, atol=5e-5)
+
+
+def test_a_thousand_pressed_bottles_come_to_rest() -> None:
+    """Closed form: walls bear the drag of all along the belt. It sloshes on if impulses close gaps at once."""
+    rows, columns, d = 40, 25, 0.13 * (1.0 + 1e-6)
+    bottles = [
+        bottle(-(0.5 + row * math.sqrt(0.75)) * d, (0.5 + column + 0.5 * (row % 2)) * d)
+        for row in range(rows)
+        for column in range(columns)
+    ]
+    width = (columns + 0.5) * d
+    walls = polyline([(-6.0, 0.0), (0.0, 0.0), (0.0, width), (-6.0, width)])
+    sim = run(8, 2, belts={"belt": belt(0.2, (-7.0, -1.0), 8.0, 6.0)}, rails={"walls": walls}, bottles=bottles)
+    sim.advance(900)
+    assert len(asleep(sim)) == 1000
+    assert _on_rails(sim) == pytest.approx((1000 * DRAG, 0.0), abs=0.01 * 1000 * DRAG)
+
+
+@pytest.mark.parametrize(("steps", "sweeps"), [(8, 1), (8, 2), (16, 2)])
+def test_rails_of_sleepers_in_a_wedge_bear_their_friction(steps: int, sweeps: int) -> None:
+    """Contact forces cancel in the sum of all balances, so the error of the rails is at most that of all bottles."""
+    below = belt(0.2, (-3.0, -1.0), 5.0, 3.0)
+    wedge = polyline([(-1.5, -0.6), (1.3, 0.44), (-1.5, 1.48)])
+    sim = run(steps, sweeps, belts={"belt": below}, rails={"wedge": wedge}, bottles=crowd(6, 5)["bottles"])
+    for _ in range(40):
+        sim.advance(100)
+        if len(asleep(sim)) == 30:
+            break
+    assert len(asleep(sim)) == 30
+    drags = MU_BASE * G * float(sim.model.type_mass[sim.bottles().type].sum())
+    assert _on_rails(sim) == pytest.approx((drags, 0.0), abs=2.0 * BALANCE * drags)
+
+
+def _on_rails(sim: Simulation) -> tuple[float, float]:
+    """Return the force of all bottles on all rails, along x and y, N."""
+    contacts = sim.contacts()
+    on = contacts.kind == 1
+    normal, tangential = contacts.normal_force[on], contacts.tangential_force[on]
+    nx, ny = contacts.nx[on], contacts.ny[on]
+    return float(np.sum(normal * nx + tangential * ny)), float(np.sum(normal * ny - tangential * nx))
 
 
 def test_sleepers_count_in_peaks() -> None:

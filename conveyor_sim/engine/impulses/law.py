@@ -6,6 +6,9 @@ step of spring and dashpot along n, and of the friction curve along t, at most m
 that closes faster than `threshold` and holds no impulse is an impact: it rebounds with e, and the bodies move back to
 the moment of touch. An impact may follow another only after WAIT visits; otherwise endless impacts would carry a load.
 
+A contact that holds no impulse may close its gap in the step. One that bears closes a gap as slowly as it opens an
+overlap: if its impulse closed gaps at once, the friction in crowds would feed waves.
+
 There are no branches, so the loop over pairs is vectorised.
 """
 
@@ -13,6 +16,9 @@ from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.contact.friction import implicit_slip
 
 WAIT = 3.0
+
+NEAR = 1e-4
+"""Gap across which a contact that holds an impulse still bears, m."""
 
 
 @part
@@ -58,8 +64,11 @@ def visit(
     hit = hit if separating < -threshold else 0.0
     hit = hit if wait == 0.0 else 0.0
     left = -gap - normal * compliance
-    rate = open_rate if gap > 0.0 else closed_rate
-    gain = open_gain if gap > 0.0 else closed_gain
+    bears = normal if gap < NEAR else 0.0
+    ahead = gap if gap > 0.0 else 0.0
+    closing = ahead if bears == 0.0 else 0.0
+    rate = open_rate if closing > 0.0 else closed_rate
+    gain = open_gain if closing > 0.0 else closed_gain
     aim = left * rate
     aim = aim if aim < fastest else fastest
     impulse = normal + (aim - separating) * gain
@@ -78,10 +87,9 @@ def visit(
     later = wait - 1.0
     later = later if later > 0.0 else 0.0
     later = WAIT if hit > 0.0 else later
-    push = apart * left
-    push = push if left > 0.0 else 0.0
-    push = push * act
-    ahead = gap if gap > 0.0 else 0.0
+    # A contact that goes on bearing is moved together as well.
+    together = left if bears * impulse > 0.0 else 0.0
+    push = apart * (left if left > 0.0 else together) * act
     speed = separating if hit > 0.0 else -1.0
     back = hit * ahead / speed
     return (
