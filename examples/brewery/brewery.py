@@ -31,29 +31,55 @@ class LineStep(IntEnum):
     """The source stands, and the line runs until it is empty. Then the format changes."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Combiner:
-    """Combiner, slower while a queue behind it reaches the photo-eye `queued`, and standing while it reaches `full`."""
+    """Control of a combiner by the queue in the lane behind it.
+
+    The feed is slower while the queue reaches the photo-eye `queued`, and stands while it reaches `full`. All stands
+    while it reaches `backed`. Bottles that stand on running chains, with none behind them in the lane, have wedged: the
+    chains run backward for a moment.
+    """
 
     cell: str
     supply: str
     """Belt before the cell."""
     speeds: tuple[float, float]
     """Full speeds of this belt and of the feed, m/s."""
-    slower: float = 0.72
-    """Share of these speeds while a queue stands in the lane."""
+    slower: float = 0.65
+    """Share of these speeds while the queue reaches `queued`."""
+    stuck: int = 100
+    """Time after which standing bottles have wedged, scans."""
+    clearing: int = 300
+    """Time to clear them, scans. In its first half, the chains run backward."""
+    _stuck: int = 0
+    _clearing: int = 0
 
-    def commands(self, inputs: Inputs, runs: bool) -> Mapping[str, float]:
+    def scan(self, inputs: Inputs, runs: bool) -> Mapping[str, float]:
         """Return the commands of its belts in one scan."""
-        clear = inputs[f"photo_eyes/{self.cell}_full/blocked"] == 0.0
-        share = 1.0 if inputs[f"photo_eyes/{self.cell}_queued/blocked"] == 0.0 else self.slower
-        feed, chains = f"{self.cell}_feed", f"{self.cell}_chains"
+
+        def covered(eye: str) -> bool:
+            return inputs[f"photo_eyes/{self.cell}_{eye}/blocked"] != 0.0
+
+        backed = covered("backed")
+        wedged = covered("standing") and not covered("entered") and not backed
+        if self._clearing:
+            self._clearing -= 1
+        else:
+            self._stuck = self._stuck + 1 if wedged else 0
+        if self._stuck > self.stuck:
+            self._stuck, self._clearing = 0, self.clearing
+        if not runs:
+            self._stuck = self._clearing = 0
+        feeds = runs and not backed and not covered("full") and not self._clearing
+        share = self.slower if covered("queued") else 1.0
+        feed, chains = f"belts/{self.cell}_feed", f"belts/{self.cell}_chains"
         return {
-            **{f"belts/{belt}/run": float(runs and clear) for belt in (self.supply, feed, chains)},
-            **{
-                f"belts/{belt}/cmd_speed": share * speed
-                for belt, speed in zip((self.supply, feed), self.speeds, strict=True)
-            },
+            f"belts/{self.supply}/run": float(feeds),
+            f"belts/{self.supply}/cmd_speed": share * self.speeds[0],
+            f"{feed}/run": float(feeds),
+            f"{feed}/cmd_speed": share * self.speeds[1],
+            f"{chains}/run": float(runs and not backed),
+            f"{chains}/reverse": float(2 * self._clearing > self.clearing),
         }
 
 
@@ -116,7 +142,7 @@ class BottlingLine:
         for belt in self.belts:
             commands[f"belts/{belt}/run"] = float(runs)
         for combiner in self.combiners:
-            commands.update(combiner.commands(inputs, runs))
+            commands.update(combiner.scan(inputs, runs))
         for machine in self.machines:
             commands[f"machines/{machine}/run"] = float(runs)
         for machine in (self.source, *self.machines):
@@ -160,7 +186,7 @@ def brewery(buffer: float = 9.0, started: bool = False) -> Controller:
         source="depalletiser",
         machines=("rinser", "pasteuriser", "labeller", "packer"),
         belts=("spread", "filled", "leaving", "wide", "packing", *(f"{cell}_lane" for cell in cells)),
-        combiners=(Combiner("single", "supply", (0.05, 0.12)), Combiner("label", "cold", (0.055, 0.12))),
+        combiners=(Combiner("single", "supply", (0.046, 0.12)), Combiner("label", "cold", (0.05, 0.12))),
         bottles=(
             *(f"belts/{belt}/bottles" for belt in (*belts, "block_infeed", "block_discharge")),
             *(f"belts/{cell}_{belt}/bottles" for cell in cells for belt in ("feed", "chains", "lane")),
