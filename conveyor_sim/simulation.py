@@ -268,6 +268,7 @@ class Simulation:
         with self._accounts.feeding():
             yield self._state.world.bottles, self._slots()
             self._state.world.neighbourhood.stale[0] = 1
+            self._state.moves += 1
         self._state.make_lists()
         self.integration.put_in()
 

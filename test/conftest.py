@@ -30,8 +30,9 @@ and each process compiles the parts again.
 """
 
 LONGEST = (
-    "fuzz/test_fuzz.py", "ros/test_pages.py", "ros/test_floods.py", "page/test_live.py", "test_shipped_scenes.py",
-    "page/test_page.py", "test_simulation.py",
+    "fuzz/test_fuzz.py", "testing/test_cookbook.py", "test_shipped_scenes.py", "accuracy/test_study.py",
+    "ros/test_pages.py", "test_brewery.py", "ros/test_node_source.py", "ros/test_floods.py", "page/test_live.py",
+    "testing/test_tutorial_line.py", "page/test_page.py", "test_simulation.py",
 )  # fmt: skip
 """Other files that took more than 35 s where three processes shared two cores, the longest first."""
 

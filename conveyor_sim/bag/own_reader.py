@@ -12,6 +12,7 @@ from typing import Any
 from mcap.opcode import Opcode
 from mcap.reader import SeekingReader
 from mcap.records import Header
+from mcap.summary import Summary
 
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
 from conveyor_sim.bag.mcap.index import Index, read_index
@@ -23,6 +24,22 @@ from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import DEFAULT, type_hash, typestore
 
 
+class _IndexedReader(SeekingReader):
+    """Reader of a file whose index has been read. The library would read it a second time."""
+
+    def __init__(self, index: Index, data: mmap.mmap) -> None:
+        super().__init__(data, validate_crcs=True, record_size_limit=LIMIT)  # type: ignore[arg-type]
+        self._known = Summary()
+        self._known.schemas = index.schemas
+        self._known.channels = index.channels
+        self._known.statistics = index.statistics
+        self._known.chunk_indexes = index.chunks
+
+    def get_summary(self) -> Summary:
+        """Return the index."""
+        return self._known
+
+
 class OwnReader:
     """One sealed MCAP file of a Recorder."""
 
@@ -31,7 +48,7 @@ class OwnReader:
         self._channels = index.channels
         self._statistics = index.statistics
         self._data = data
-        self._reader = SeekingReader(data, validate_crcs=True, record_size_limit=LIMIT)  # type: ignore[arg-type]
+        self._reader = _IndexedReader(index, data)
 
     @cached_property
     def topics(self) -> Sequence[RecordedTopic]:

@@ -52,6 +52,8 @@ def import_(
     for note in result.notes:
         click.echo(f"note: {note}")
     if not any(result.sections.values()):
+        if rules.ignores_all:
+            raise ConveyorError(f"{map_}: every layer is ignored, expected another kind than ignore for one at least")
         raise ConveyorError(f"{plan}: no entity became a part, expected entities on the layers of {map_}")
     text = scene_text(result.sections, f"From {plan.name} (drawn in {drawn.unit}) by the map {map_.name}.", base)
     try:

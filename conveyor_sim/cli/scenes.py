@@ -97,6 +97,10 @@ def _watch(path: Path, port: int, options: SceneOptions) -> None:
 @click.option("--modbus", is_flag=True, help="Print the map of Modbus addresses of all tags as CSV.")
 @click.option("--map", "kept", type=click.Path(path_type=Path), help="With --modbus: a map to keep, which only grows.")
 @click.option("--word-order", type=click.Choice(["big", "little"]), default="big", help="Of Modbus: ABCD or CDAB.")
+@click.option(
+    "--controller", help="List its alarms as well: program.st, library.so, file.py:factory or module:factory."
+)
+@click.option("--parameters", default="", help="The controller's, by name: a mapping in YAML, or a .yaml file.")
 @scene_options
 def tags(
     scene: str,
@@ -107,11 +111,15 @@ def tags(
     modbus: bool,
     kept: Path | None,
     word_order: WordOrder,
+    controller: str | None,
+    parameters: str,
     options: SceneOptions,
 ) -> None:
     """List the tags of SCENE: signals, commands and faults, with units, ranges and meaning."""
+    from conveyor_sim.cli.controller_options import controller_source
     from conveyor_sim.protocols.modbus.address_map import keep_map, modbus_map
     from conveyor_sim.report.tags import chosen_tags, line_tags, tag_csv, tag_listing, tag_objects
+    from conveyor_sim.run.controller_tags import controller_tags
     from conveyor_sim.support.modbus_rows import to_csv
 
     given = [option for option, on in (("--json", as_json), ("--csv", as_csv), ("--modbus", modbus)) if on]
@@ -119,13 +127,16 @@ def tags(
         raise ConveyorError(f"{given[1]}: given with {given[0]}, expected one of them")
     if modbus and (kinds or names):
         raise ConveyorError("--modbus: given with --kind or --name, expected neither: the map has the addresses of all")
+    source = controller_source(controller, parameters, ())
+    if modbus and source is not None:
+        raise ConveyorError("--modbus: given with --controller, expected one of them: its alarms have no addresses")
     loaded = options.load(scene)
     if modbus:
         tags = line_tags(loaded)
         rows = modbus_map(tags, word_order=word_order) if kept is None else keep_map(kept, tags, word_order)
         click.echo(to_csv(rows), nl=False)
         return
-    chosen = chosen_tags(loaded, names, kinds)
+    chosen = chosen_tags(loaded, names, kinds, [] if source is None else controller_tags(loaded, source))
     if as_csv:
         click.echo(tag_csv(loaded, chosen), nl=False)
     elif as_json:

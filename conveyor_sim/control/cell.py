@@ -39,6 +39,11 @@ class _InCell:
         return tuple(self._alarm(alarm) for alarm in declared_alarms(self._controller))
 
     @property
+    def alarm_tags(self) -> tuple[str, ...]:
+        """Tags of the controller's alarms, named as in the scene."""
+        return tuple(map(self.outside, getattr(self._controller, "alarm_tags", ())))
+
+    @property
     def variables(self) -> Mapping[str, float]:
         """Variables of the controller by name."""
         return {self._variable(name): value for name, value in getattr(self._controller, "variables", {}).items()}

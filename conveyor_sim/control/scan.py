@@ -88,6 +88,7 @@ class Controller(Protocol):
 
     - `declared_alarms`: a sequence of Alarm. Alarms without a declaration have defaults.
     - `bind`: a method that receives the line's tags (`LineTags`) before the first scan.
+    - `alarm_tags`: tags (`alarms/<id>`) of alarms without a declaration, available after `bind`.
     - `variables`: numbers by name, available to conditions of tests.
     - `record`: patterns of the variables to record (`recorded.py`).
     - `left_over`: sentences about tags without use, available after `bind`.
@@ -108,6 +109,12 @@ def declared_alarms(controller: object) -> tuple[Alarm, ...]:
         if ids.count(id) > 1:
             raise ControlError(f"{name}: {id} declared twice, expected once")
     return tuple(declared)
+
+
+def known_alarms(controller: object) -> dict[str, str]:
+    """Return the texts of the alarms that a bound controller announces, by tag. Raise ControlError for invalid ones."""
+    texts = {f"{ALARMS}{alarm.id}": alarm.text or alarm.id for alarm in declared_alarms(controller)}
+    return {tag: tag.removeprefix(ALARMS) for tag in getattr(controller, "alarm_tags", ())} | texts
 
 
 def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
@@ -158,6 +165,11 @@ class _Several:
         """Variables of all controllers."""
         shown: Any = [getattr(controller, "variables", {}) for controller in self.controllers]
         return ChainMap(*shown)  # read-only view
+
+    @property
+    def alarm_tags(self) -> tuple[str, ...]:
+        """Tags of the alarms of all controllers."""
+        return tuple(tag for controller in self.controllers for tag in getattr(controller, "alarm_tags", ()))
 
     @property
     def record(self) -> tuple[str, ...]:

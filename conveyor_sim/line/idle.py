@@ -25,6 +25,7 @@ class CalledDevices:
         self.beginning: list[Device] = []
         self.ending: list[Device] = []
         self._changed = changed
+        self._acting = self._stale = False
         self._resting: dict[Device, None] = {}
         self._sleepers = [device for device in devices if type(device).rests is not Device.rests]
         for device in self._sleepers:
@@ -38,6 +39,9 @@ class CalledDevices:
 
     def begin(self, now: ScanContext) -> None:
         """Let devices act before the steps of a tick. One that wakes a later device acts before it."""
+        self._acting = True
+        if self._stale:
+            self._divide()
         for device in self.beginning:
             device.begin(now)
 
@@ -52,7 +56,8 @@ class CalledDevices:
             device.end(now)
 
     def review(self, now: ScanContext) -> None:
-        """Let devices rest from now on that have nothing to do."""
+        """Let devices rest from now on that have nothing to do, and end the tick."""
+        self._acting = False
         if resting := [device for device in self._awake if device.rests(now)]:
             self._resting.update(dict.fromkeys(resting))
             self._divide()
@@ -60,10 +65,14 @@ class CalledDevices:
     def _wake(self, device: Device) -> None:
         if device in self._resting:
             self._resting.pop(device)
-            self._divide()
+            # The commands of a tick may wake many devices: the lists are made once then, as the devices begin.
+            self._stale = True
+            if self._acting:
+                self._divide()
 
     def _divide(self) -> None:
         """Make the lists of devices to call, in order. They change in place, because `begin` may be using them."""
+        self._stale = False
         self.beginning[:] = [device for device in self._beginning if device not in self._resting]
         self.ending[:] = [device for device in self._ending if device not in self._resting]
         self._awake = [device for device in self._sleepers if device not in self._resting]

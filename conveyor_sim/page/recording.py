@@ -209,6 +209,7 @@ class PageRecording:
     def head(self) -> dict[str, Any]:
         """Return the data of `head.head`, with the times and the numbers of blocks and stretches."""
         times = {
+            "began": self._began,
             "first": self.first,
             "last": self.last,
             "block": self._block_ticks,

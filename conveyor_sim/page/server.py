@@ -9,7 +9,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 
-from conveyor_sim.bag.reader import open_bag
+from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.page.difference import RecordingComparison
 from conveyor_sim.page.http_host import PageHost
 from conveyor_sim.page.recording import Detail, PageRecording, text
@@ -26,18 +26,29 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         Raise BagError, SceneError, and ConveyorError if the port is taken, or the recordings can't be compared.
         """
         with ExitStack() as stack:
-            bags = [path] if other is None else [path, other]
-            # Blocks on display and the story are read in parallel, each by its own reader.
-            for_blocks, for_stories = (
-                [stack.enter_context(open_bag(bag, by_index=True)) for bag in bags] for _ in range(2)
-            )
-            self._blocks = [PageRecording(bag, SERVED) for bag in for_blocks]
-            self._stories = [PageRecording(bag, SERVED) for bag in for_stories]
-            a, *b = for_stories
-            self._comparison = RecordingComparison(a, b[0], SERVED.story) if b else None
+            self._bags = [path] if other is None else [path, other]
+            self._blocks = [PageRecording(self._opened(bag, stack), SERVED) for bag in self._bags]
+            # Blocks on display and the story are read in parallel, each by its own reader. That of the story is opened
+            # at the first request for it, after the first frame.
+            self._later = stack.enter_context(ExitStack())
+            self._stories: list[PageRecording] = []
+            self._comparison: RecordingComparison | None = None
+            if other is not None:
+                a, b = (self._opened(bag, stack) for bag in self._bags)
+                self._comparison = RecordingComparison(a, b, SERVED.story)
             self._block_lock, self._story_lock = threading.Lock(), threading.Lock()
             self._host = stack.enter_context(PageHost(self.answer, port))
             self._stack = stack.pop_all()
+
+    @staticmethod
+    def _opened(bag: Path, stack: ExitStack) -> Bag:
+        return stack.enter_context(open_bag(bag, by_index=True))
+
+    def _story(self, place: int, number: int) -> bytes:
+        """Return a stretch of the story of a recording."""
+        if not self._stories:
+            self._stories = [PageRecording(self._opened(bag, self._later), SERVED) for bag in self._bags]
+        return self._stories[place].story(number)
 
     @property
     def url(self) -> str:
@@ -54,13 +65,13 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
         if place >= len(self._blocks):
             raise KeyError(name)
         kind, _, number = name.removeprefix("other/").partition("/")
-        blocks, stories, comparison = self._blocks[place], self._stories[place], self._comparison
+        blocks, comparison = self._blocks[place], self._comparison
         if kind == "head" and not number:
             compared = {"compared": comparison.head()} if comparison is not None and not place else {}
             return self._deflated(self._block_lock, lambda: text({**blocks.head(), **compared}))
         if kind == "fullest" and not number:
-            return self._deflated(self._story_lock, lambda: text(stories.fullest()))
-        counts = {"story": stories.stories, "block": blocks.blocks}
+            return self._deflated(self._block_lock, lambda: text(blocks.fullest()))
+        counts = {"story": blocks.stories, "block": blocks.blocks}
         if comparison is not None and not place:
             counts["difference"] = counts["peaks"] = comparison.stretches
         if kind not in counts or not (number.isdecimal() and len(number) < 10) or int(number) >= counts[kind]:
@@ -71,7 +82,7 @@ class RecordingServer(AbstractContextManager["RecordingServer"]):
             return self._deflated(self._story_lock, lambda: text(comparison.part(int(number))))
         if kind == "peaks" and comparison is not None:
             return self._deflated(self._story_lock, lambda: text(comparison.peaks(int(number))))
-        return self._deflated(self._story_lock, lambda: stories.story(int(number)))
+        return self._deflated(self._story_lock, lambda: self._story(place, int(number)))
 
     def __exit__(self, *_: object) -> None:
         """Stop the server."""

@@ -29,6 +29,11 @@ class Period(NamedTuple):
         return self.end - self.begin
 
     @property
+    def is_after(self) -> bool:
+        """True if its reason is over, and the machine has not been started again."""
+        return _is_after(self.category, self.reason)
+
+    @property
     def why(self) -> str:
         """The reason, or else the category."""
         return _why(self.category, self.reason)
@@ -50,11 +55,16 @@ class StopReason(NamedTuple):
         return _why(self.category, self.reason)
 
 
+def _is_after(category: str, reason: str) -> bool:
+    """Return True for a failure, a planned stop or an Abort whose machine is idle after it."""
+    return (
+        category == "idle" and bool(reason) and (not reason.startswith("command") or reason.startswith("command Abort"))
+    )
+
+
 def _why(category: str, reason: str) -> str:
-    """Return the reason in words. A failure, a planned stop or an Abort is over when its machine is idle after it."""
-    if category == "idle" and reason and (not reason.startswith("command") or reason.startswith("command Abort")):
-        return f"after {reason}"
-    return reason or category
+    """Return the reason in words."""
+    return f"after {reason}" if _is_after(category, reason) else reason or category
 
 
 def stop_reasons(periods: Iterable[Period]) -> list[StopReason]:

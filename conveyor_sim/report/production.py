@@ -16,6 +16,7 @@ from conveyor_sim.bag.reader import Bag, Frame, open_bag
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.errors import BagError
 from conveyor_sim.report.alarm_figures import AlarmFigures, AlarmTally
+from conveyor_sim.report.commanded_stops import CommandedStops
 from conveyor_sim.report.interval import counters_within
 from conveyor_sim.report.periods import Period
 from conveyor_sim.report.span import Times, span_of
@@ -85,6 +86,8 @@ def read_production(path: Path, times: Times | None = None) -> Production:
                 if kind == "machine_state":
                     follower.take(bag.time(int(at)), name, printable(text))
         tick, periods = int(bag.line.tick_ns) * 1e-9, follower.finished(end)
+        commanded = CommandedStops(bag, list(periods))
+        periods = {name: [part for one in of for part in commanded.applied(one)] for name, of in periods.items()}
         span = None
         # Recordings before format 3 keep the figures that they hold, unless times are given.
         if times is not None and (bag.format >= 3 or times != Times()):

@@ -81,19 +81,24 @@ def _limit(tag: Tag, value: float) -> str:
     return f"{value:.0f}" if tag.kind == "count" else f"{value:.15g}"
 
 
-def chosen_tags(scene: Scene, names: Sequence[str] = (), kinds: Sequence[str] = ()) -> list[Tag]:
+def chosen_tags(
+    scene: Scene, names: Sequence[str] = (), kinds: Sequence[str] = (), added: Sequence[Tag] = ()
+) -> list[Tag]:
     """Return the tags of a scene's line that fit, in listing order.
 
-    names, kinds: patterns (`belts/*`), one of which must match the name, and the role or the data type; empty: all.
+    added: alarms of a controller, listed behind those of the line. names, kinds: patterns (`belts/*`), one of which
+    must match the name, and the role or the data type; empty: all.
     Raise ConveyorError for a pattern that matches no role and no data type.
     """
     for kind in kinds:
         if not any(fnmatchcase(known, kind) for known in KINDS):
             expected = f"one of {', '.join(KINDS)}, or a pattern with *"
             raise ConveyorError(f"--kind: {printable(kind)} given, expected {expected}")
+    own = line_tags(scene)
+    end = max((place + 1 for place, tag in enumerate(own) if tag.role == "alarm"), default=len(own))
     return [
         tag
-        for tag in line_tags(scene)
+        for tag in (*own[:end], *added, *own[end:])
         if matches(tag.name, names) and (matches(tag.role, kinds) or matches(tag.kind, kinds))
     ]
 

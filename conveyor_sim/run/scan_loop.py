@@ -16,7 +16,7 @@ from conveyor_sim.control.recorded import RecordedVariables
 from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, LineTags, bind, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.commands.inputs import DECLARE, OWN, CommandOutcome, Input
-from conveyor_sim.line.tag import CONTROLLED, of_roles
+from conveyor_sim.line.tag import CONTROLLED, ProcessImage, of_roles
 from conveyor_sim.physics.state.checkpoint import read_checkpoint
 from conveyor_sim.run.alarm_changes import AlarmChanges
 from conveyor_sim.run.controller_source import located
@@ -24,6 +24,13 @@ from conveyor_sim.simulation import Simulation
 
 CONTROLLER = "controller"
 """Source of the commands of a controller that is an object of this process."""
+
+
+def tags_for_control(image: ProcessImage) -> LineTags:
+    """Return the tags of a line that a controller may read and command."""
+    controlled = of_roles(image.commands, CONTROLLED)
+    signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, controlled))
+    return LineTags(signals, commands, image.command_limits)
 
 
 class AttachedController(Protocol):
@@ -70,10 +77,7 @@ class LocalController(AttachedController):
         record: patterns of recorded variables, in addition to the controller's own patterns (`RecordedVariables`).
         Raises ControlError for a controller that does not fit the line, and for a pattern that fits no variable.
         """
-        image = simulation.process_image
-        controlled = of_roles(image.commands, CONTROLLED)
-        signals, commands = ({tag.name: tag.kind for tag in tags} for tags in (image.signals, controlled))
-        bind(controller, LineTags(signals, commands, image.command_limits))
+        bind(controller, tags_for_control(simulation.process_image))
         declared = declared_alarms(controller)
         self.writer = type(controller).__name__
         self.controller = controller

@@ -179,6 +179,37 @@ def test_more_neighbours_than_colours() -> None:
     assert hashes[0] == hashes[1]
 
 
+def test_rebuilds_list_the_pairs_of_slow_fast_and_new_bottles() -> None:
+    """Most rebuilds take pairs from the coarse list. Fast bottles, and new ones in slots, are searched beside it."""
+    state, random, spent = pressed_crowd()._state, np.random.default_rng(5), []
+    skin = state.model.settings.skin
+    for turn in range(60):
+        bottles = state.world.bottles
+        slots = np.flatnonzero(bottles.id >= 0)
+        bottles.x[slots] += random.uniform(-0.05, 0.06, slots.size) * skin
+        fast = random.choice(slots, 3, replace=False)
+        bottles.y[fast] += random.uniform(-3.0, 3.0, 3) * skin
+        if turn % 4 == 0:
+            kind, x, y = int(bottles.type[fast[1]]), float(bottles.x[fast[2]]), float(bottles.y[fast[2]])
+            state.remove(int(fast[0]))
+            state.remove(int(fast[1]))
+            state.add(kind, x + skin, y, 0.0, 0.0, 0.0, 0.0)
+        state.world.neighbourhood.stale[0] = 1
+        state.make_lists()
+        pairs, coarse = state.world.pairs, state.world.neighbourhood.coarse
+        assert pairs is not None
+        assert coarse is not None
+        spent.append(int(coarse.spent[0]))
+        i, j = np.triu_indices(bottles.id.size, 1)
+        reach = bottles.radius[i] + bottles.radius[j] + skin
+        near = np.hypot(bottles.x[i] - bottles.x[j], bottles.y[i] - bottles.y[j]) < reach
+        near &= (bottles.id[i] >= 0) & (bottles.id[j] >= 0)
+        count = int(pairs.used[0])
+        np.testing.assert_array_equal(pairs.i[:count], i[near])
+        np.testing.assert_array_equal(pairs.j[:count], j[near])
+    assert 2 < spent.count(0) < 30
+
+
 def test_lists_that_are_too_short_leave_no_trace() -> None:
     """A call returns where a rebuilt list does not fit; the rest of the tick follows with a longer one."""
     one, other = pressed_crowd(), pressed_crowd()

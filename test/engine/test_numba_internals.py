@@ -200,6 +200,7 @@ def test_a_part_has_an_entry_by_which_numba_finds_its_code_and_no_machine_code()
 
 @relies_on(
     "core/dispatcher.py: _DispatcherBase.get_call_template",
+    "core/dispatcher.py: _DispatcherBase.add_overload",
     "core/dispatcher.py: _FunctionCompiler.fold_argument_types",
     "core/types/containers.py: NamedTuple",
 )
@@ -216,7 +217,8 @@ def test_a_call_compiles_what_its_template_is_made_for() -> None:
 
     assert calls(COLUMNS) == 1.0
     ((narrow,),) = first.signatures  # type: ignore[attr-defined]
-    ((full,),) = calls.signatures
+    full = numba.typeof(COLUMNS)
+    assert calls.signatures == [(narrow,)]
     assert isinstance(narrow, GroupType) and isinstance(full, GroupType)
     assert (narrow.fields, narrow.types[1], narrow.types[0]) == (("x", "y"), HIDDEN, full.types[0])
     assert full.types[1] != HIDDEN
@@ -336,7 +338,7 @@ def test_compiling_is_announced_with_start_and_end() -> None:
     measured.begin()
     outer(1.0)
     measured.end()
-    kernel(lambda x: x)(1.0)
+    outer(1)  # compiled for another type
     assert (measured.spent, next(ticks)) == (1.0, 2)
 
 

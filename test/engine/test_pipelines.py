@@ -16,7 +16,7 @@ from conveyor_sim.engine.compiler.groups import fewer, group
 from conveyor_sim.engine.compiler.kernel_folder import KernelFolder
 from conveyor_sim.engine.compiler.numba_internals.call_by_address import call
 from conveyor_sim.engine.compiler.numba_internals.dispatcher import kernel_dispatcher
-from conveyor_sim.engine.compiler.numba_internals.machine_code import address
+from conveyor_sim.engine.compiler.numba_internals.machine_code import address, entry
 
 
 def kernel(function: Any) -> Any:
@@ -190,6 +190,21 @@ def test_a_part_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_
     assert len(is_there.signatures) == 4, "of what kind the member is"
     inspect_both(Outer(Inner(np.zeros(3, np.int64), 1.0), None))
     assert (len(both.signatures), len(size.signatures)) == (2, 2)
+
+
+def test_a_kernel_is_compiled_once_for_all_groups_that_differ_in_what_it_does_not_read() -> None:
+    @kernel
+    def last(outer: Any) -> float:
+        return scaled(outer.inner, outer.inner.values.size - 1)
+
+    inner = Inner(np.array([1.0, 2.0]), 10.0)
+    for sums in (None, 3.0, np.zeros(2), np.zeros((2, 2)), inner):
+        outer = Outer(inner, sums)
+        assert entry(last, outer)(outer) == last(outer) == last(outer) == 20.0
+    assert len(last.signatures) == 1
+    other = Outer(Inner(np.array([1, 2]), 10.0), None)
+    assert last(other) == entry(last, other)(other) == 20.0
+    assert len(last.signatures) == 2
 
 
 @relies_on(

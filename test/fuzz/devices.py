@@ -59,6 +59,10 @@ def drives(draw: st.DrawFn, frame: Frame, belts: Data) -> Data:
     return {"belts": moved, "drives": named} if named else {"belts": moved}
 
 
+EACH_WHEEL = ("star", "star", "screw", "side belt")
+"""Where scenes have the same effects; the first star wheel has many pockets then, which is another effect."""
+
+
 @st.composite
 def axes(draw: st.DrawFn, frame: Frame, belts: Data, drives: Data) -> Data:
     """Axes with gears, and belts that they move; the fields `axes` and `belts`."""
@@ -85,10 +89,10 @@ def axes(draw: st.DrawFn, frame: Frame, belts: Data, drives: Data) -> Data:
 
 
 @st.composite
-def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data) -> Data:
+def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data, alike: bool) -> Data:
     """Star wheels with carousels, screws and side belts; the fields of these, and `axes` with at least one.
 
-    found: axes of the scene. Their limits of torque suffice for their accelerations.
+    found: axes of the scene. Their limits of torque suffice for their accelerations. alike: draw EACH_WHEEL.
     """
     machines: dict[str, dict[str, Data]] = {"axes": dict(found), "stars": {}, "carousels": {}, "screws": {}}
     machines["side_belts"] = {}
@@ -107,10 +111,10 @@ def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data) -> Data:
             axis["inertia"] = heaviest * reach**2 * draw(scaled(0.3, 30.0))
             axis["torque_limit"] = axis["inertia"] * axis["acceleration"] * spare
     names = sorted(machines["axes"])
-    for n in range(draw(st.integers(1, 3))):
+    for n in range(len(EACH_WHEEL) if alike else draw(st.integers(1, 3))):
         axis, pocket = draw(st.sampled_from(names)), frame.unit * draw(st.sampled_from([1.02, 1.2, 2.0]))
         on_axis = {"axis": axis, "material": material, "pocket_radius": pocket}
-        what = draw(st.sampled_from(["star", "star", "screw", "side belt"])) if n else "star"
+        what = EACH_WHEEL[n] if alike else draw(st.sampled_from(EACH_WHEEL)) if n else "star"
         start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
         length = frame.unit * draw(st.integers(2, 8))
         end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]
@@ -127,7 +131,7 @@ def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data) -> Data:
             side = draw(st.sampled_from(["left", "right"]))
             machines["screws"]["screw"] = {**on_axis, "from": start, "to": end, "side": side, "pitch": points}
         else:
-            pockets = draw(st.sampled_from([1, 2, 3, 8]))
+            pockets = 8 if alike and n == 0 else draw(st.sampled_from([1, 2, 3, 8]))
             radius = max(1.3 * pocket * pockets / math.pi, 1.5 * pocket)
             star = {**on_axis, "centre": start, "entry": angle, "turn": draw(st.sampled_from(["left", "right"]))}
             star |= {"pockets": pockets, "pitch_radius": radius, "carry": draw(between(0.5, 6.28))}
@@ -156,8 +160,8 @@ POSITIONED = {"dividers": "lane", "adjustable": "setting"}
 
 
 @st.composite
-def movers(draw: st.DrawFn, frame: Frame, material: str, lifts: bool) -> Data:
-    """Gates, pushers, diverters, dividers, adjustable guides and clamps; at least one."""
+def movers(draw: st.DrawFn, frame: Frame, material: str, lifts: bool, alike: bool) -> Data:
+    """Gates, pushers, diverters, dividers, adjustable guides and clamps; at least one. alike: the first has a limit."""
     fields = ("gates", "pushers", "diverters", *POSITIONED, "clamps")
     found: dict[str, dict[str, Data]] = {field: {} for field in fields}
     for n in range(draw(st.integers(1, 3))):
@@ -192,7 +196,7 @@ def movers(draw: st.DrawFn, frame: Frame, material: str, lifts: bool) -> Data:
         if not swings and rail.get("kind") != "lift":
             rail["direction"] = draw(between(-math.pi, math.pi))
         rail["acceleration"] = rail["max_speed"] / (frame.tick * draw(st.sampled_from([0.5, 4.0, 30.0])))
-        rail |= draw(_drives(frame, swings, length, rail["acceleration"]))
+        rail |= draw(_drives(frame, swings, length, rail["acceleration"], alike and n == 0))
         found[field][f"mover_{n}"] = rail
     return found
 
@@ -208,12 +212,12 @@ def row_pushers(draw: st.DrawFn, frame: Frame, pushers: Data, zones: Data) -> No
 
 
 @st.composite
-def _drives(draw: st.DrawFn, frame: Frame, swings: bool, length: float, acceleration: float) -> Data:
+def _drives(draw: st.DrawFn, frame: Frame, swings: bool, length: float, acceleration: float, limited: bool) -> Data:
     """Limit and mass of a rail that can follow its profile without bottles: with little to spare, much, or no limit."""
     mass = max(kind["mass"] for kind in frame.types.values()) * draw(scaled(0.3, 30.0))
     names = ("torque_limit", "inertia") if swings else ("force_limit", "moving_mass")
     mass *= length**2 / 3.0 if swings else 1.0
-    spare = draw(st.sampled_from([1.01, 3.0, 100.0, 0.0]))
+    spare = draw(st.sampled_from([1.01, 3.0, 100.0] if limited else [1.01, 3.0, 100.0, 0.0]))
     return {names[0]: mass * acceleration * spare if spare else "none", names[1]: mass}
 
 

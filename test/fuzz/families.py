@@ -70,6 +70,8 @@ class Family:
     axes: bool = False
     wheels: bool = False
     """Star wheels with carousels, screws, side belts, and the axes that turn them."""
+    alike: bool = False
+    """All scenes have the same effects: one of each kind of wheel, and a limit of force for the first mover."""
     panel: bool = False
     effects: tuple[tuple[str, str], ...] = ()
 
@@ -171,8 +173,18 @@ _PLAIN = Family(
 CI_FAMILIES = (
     _PLAIN,
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
-    Family(types=2, drives=True, movers=True, lifts=True, machines=True, sensors=True, ledger=True, vibration=True),
-    Family(rails=("segment", "arc"), wheels=True, panel=True, infeeds=True, ledger=True),
-    replace(_PLAIN, integrator="impulses", damping=("normal",), drives=True, movers=True),
+    Family(
+        types=2,
+        drives=True,
+        movers=True,
+        lifts=True,
+        machines=True,
+        sensors=True,
+        ledger=True,
+        vibration=True,
+        alike=True,
+    ),
+    Family(rails=("segment", "arc"), wheels=True, alike=True, panel=True, infeeds=True, ledger=True),
+    replace(_PLAIN, integrator="impulses", damping=("normal",), drives=True, movers=True, alike=True),
 )
 """Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

@@ -74,9 +74,9 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
     if family.axes:
         data |= draw(axes(frame, data["belts"], data.get("drives", {})))
     if family.wheels:
-        data |= draw(wheels(frame, STEEL, data.get("axes", {})))
+        data |= draw(wheels(frame, STEEL, data.get("axes", {}), family.alike))
     if family.movers:
-        data |= draw(movers(frame, STEEL, family.lifts))
+        data |= draw(movers(frame, STEEL, family.lifts, family.alike))
     clear = _Clear(data, frame)
     if family.machines:
         data |= draw(machines(frame, clear))

@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every row of the table once, at defaults: the paper's integrator, preset `standard`, one thread.
-
-Rows of impulses alone run in 8 steps with 2 sweeps.
+"""Every row of the table once, at defaults.
 
 `make stability` runs the matrix of integrators, presets, threads and sets of effects.
 """
@@ -12,7 +10,7 @@ import re
 
 import pytest
 from hard_cases.case import Case, read_table
-from hard_cases.measures import run
+from hard_cases.defaults import run_at_defaults
 
 from conveyor_sim.errors import SceneError
 
@@ -26,9 +24,7 @@ def test_row(case: Case) -> None:
             case.scene()
         assert re.search(case.refused, str(refusal.value))
         return
-    # No row of a file expects anything of the ledger; without, it has the kernels of the scene as it is shipped.
-    setting = ("impulses", "8x2") if tuple(case.integrators) == ("impulses",) else ("leapfrog", "standard")
-    outcome = run(case, case.scene(*setting, ledger="file" not in case.given))
+    outcome = run_at_defaults(case.name)
     assert not case.broken(outcome.measures, outcome.sentence)
     if case.command_refused:
         assert outcome.reasons and all(re.search(case.command_refused, reason) for reason in outcome.reasons)

@@ -114,6 +114,32 @@ def test_devices_close_together_have_names_with_leader_lines(browser: Any, tmp_p
     assert sum(name.startswith("eye_number_") for name in names) >= 4, "beside the belt there is room for two"
 
 
+INFEEDS = """
+name: three_infeeds
+duration: 0.1
+accuracy: draft
+bottle_types: {bottle: {radius: 33 mm, mass: 350 g, material: glass}}
+contacts: [{between: [glass, glass], stiffness: 20 kN/m}]
+base: [{between: [glass, chain], friction: 0.15}]
+conveyors: {table: {start: [0, 0], heading: 0 deg, path: [{straight: 2}], width: 400 mm, material: chain, speed: 0.2}}
+infeeds:
+  right: {along: table, at: 0.1, offset: -0.15, bottle: bottle, rate: 1 /s}
+  middle: {along: table, at: 0.1, bottle: bottle, rate: 1 /s}
+  left: {along: table, at: 0.1, offset: 0.15, bottle: bottle, rate: 1 /s}
+"""
+
+
+def test_infeeds_beside_each_other_have_their_names_at_their_arrows(browser: Any, tmp_path: Path) -> None:
+    run_scene(parse_scene(INFEEDS), tmp_path / "bag")
+    html = write_page(tmp_path / "bag", tmp_path / "page.html")
+    with opened_page(browser, html, script=NOTE_TEXTS) as page:
+        boxes = {name: box for name, *box in texts(page)}
+        for name, y in (("right", -0.15), ("middle", 0.0), ("left", 0.15)):
+            _, top, right, bottom = boxes[name]
+            arrow_x, arrow_y = to_pixels(page, 0.1, y)
+            assert right < arrow_x and top < arrow_y < bottom, name
+
+
 @pytest.mark.parametrize(
     ("part", "name", "place"),
     [("stoppers", "grip", (1.0, 0.0)), ("dividers", "left", (0.7, 0.05)), ("dividers", "right", (0.7, -0.05))],

@@ -79,12 +79,35 @@ def test_time_is_played_and_paused_by_button_and_key(page: Any) -> None:
     assert clock(page) == 24.0
 
 
+@pytest.mark.parametrize("clicked", ["#to_start", "#tab_events", "#panel_events .event >> nth=0"])
+def test_the_space_key_plays_after_a_click_on_a_button(page: Any, clicked: str) -> None:
+    page.click("#tab_events")
+    page.click(clicked)
+    settled(page)
+    before = clock(page)
+    press(page, "Space")
+    assert page.get_attribute("#play", "aria-label") == "Pause"
+    press(page, "Space")
+    assert page.get_attribute("#play", "aria-label") == "Play" and clock(page) >= before
+    page.keyboard.press("Tab")
+    page.focus("#back")
+    page.keyboard.press("Space")
+    settled(page)
+    assert clock(page) < max(before, 24.0) and page.get_attribute("#play", "aria-label") == "Play"
+
+
 def test_the_page_opens_before_what_failed_and_says_it_as_text(page: Any) -> None:
     assert clock(page) == pytest.approx(17.0, abs=0.05)
     assert page.inner_text("#notice") == "always: no more than 20 bottles <script>alert(3)</script>"
     assert page.get_attribute("#news", "class") == "wrong"
     press(page, "Home", "n")
     assert page.inner_text("#notice").startswith("fault") and page.get_attribute("#news", "class") == ""
+
+
+def test_a_failure_covers_no_part_of_the_plant(page: Any) -> None:
+    news, plan = page.locator("#news").bounding_box(), page.locator("#plan").bounding_box()
+    _, top = to_pixels(page, 4.5, 1.95)  # upper end of the belts
+    assert news["y"] + news["height"] <= plan["y"] + top
 
 
 def test_what_is_to_be_noticed_is_whole_and_dismissed(page: Any) -> None:
@@ -189,6 +212,43 @@ def test_a_state_of_a_machine_is_one_event_with_what_is_known_of_why(page: Any) 
     page.fill("#panel_events input[type=search]", "filler/category")
     settled(page)
     assert page.locator("#panel_events .event").count() > 0, "who looks for them finds them"
+
+
+def test_a_click_on_an_event_shows_what_it_changed(page: Any) -> None:
+    """The capper fails at 16.02 s, between two frames."""
+    page.click("#tab_events")
+    seek(page, 16.0)
+    page.locator("#panel_events .event", has_text="Held, failure jam").click()
+    settled(page)
+    assert clock(page) == pytest.approx(16.04, abs=1e-6)
+    page.click("#tab_line")
+    assert "capper Held" in page.get_attribute("#panel_line .bars", "aria-label")
+    page.click("#tab_alarms")
+    assert "unacknowledged · since 16.02 s" in page.inner_text("#panel_alarms .alarm:has-text('machines/capper/fault')")
+
+
+def test_a_second_failure_of_one_kind_states_its_reason(browser: Any, tmp_path: Path) -> None:
+    line = tmp_path / "line.yaml"
+    line.write_text(LINE.read_text().replace("times: [12.0, 1000.0]", "times: [1.0, 1.0]").replace("[8.0]", "[1.0]"))
+    record(tmp_path / "bag", 12.0, line=line)
+    html = write_page(tmp_path / "bag", tmp_path / "page.html", last=1.0)
+    with opened_page(browser, html) as page:
+        page.click("#tab_events")
+        press(page, "End")
+        jams = page.locator("#panel_events .event", has_text="capper Held")
+        assert jams.count() >= 2
+        assert all("failure jam" in text for text in jams.all_inner_texts())
+        jams.first.click()
+        assert "before the shown part" in page.inner_text("#notice") and clock(page) == pytest.approx(11.0)
+    html = write_page(tmp_path / "bag", tmp_path / "page.html")
+    with opened_page(browser, html) as page:
+        for state, note in (("Held", ""), ("Execute", "of the last stop")):
+            page.click("#tab_events")
+            page.locator("#panel_events .event", has_text=f"capper {state}").last.click()
+            settled(page)
+            page.click("#tab_device")
+            reason = page.locator("#panel_device tr", has_text="stop_reason")
+            assert " ".join(reason.inner_text().split()) == f"stop_reason {note} failure jam".replace("  ", " ")
 
 
 def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import struct
 import threading
@@ -23,6 +24,7 @@ from page.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
 from page.test_page import clock
 from protocols.waiting import until
 
+from conveyor_sim.bag import own_reader
 from conveyor_sim.bag.mcap.chunk import next_chunk
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -309,6 +311,46 @@ def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(
         assert 1 <= len(read) - before <= 4
         list(opened.raw())
     assert len(read) > 20, "there were others to be read"
+
+
+def test_the_first_frame_needs_as_much_of_a_long_recording_as_of_a_short_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page asks for the head, the tick with the most bottles, and the blocks that it draws first."""
+    read: list[int] = []
+    really_read = reader.breakup_chunk
+
+    def noted(chunk: Any, validate_crc: bool = False) -> Any:
+        read.append(len(chunk.data))
+        return really_read(chunk, validate_crc)
+
+    indexes: list[Path] = []
+    really_open = own_reader.own_reader
+
+    def noted_index(file: Path) -> Any:
+        indexes.append(file)
+        return really_open(file)
+
+    monkeypatch.setattr(reader, "breakup_chunk", noted)
+    monkeypatch.setattr("conveyor_sim.bag.reader.own_reader", noted_index)
+    monkeypatch.delattr(reader, "_read_summary_from_stream_reader")  # the library would read the index again
+    chunks, content = [], []
+    for seconds in (90.0, 900.0):
+        bag = written(tmp_path / f"bag_{seconds:.0f}", seconds, 20)
+        read.clear()
+        indexes.clear()
+        with RecordingServer(bag) as server:
+            times = json.loads(zlib.decompress(server.answer("head")))["times"]
+            fullest = json.loads(zlib.decompress(server.answer("fullest")))
+            for number in (0, fullest // times["block"], fullest // times["block"] + 1):
+                server.answer(f"block/{number}")
+            assert len(indexes) == 1, "an index grows with the recording"
+        assert times["last"] == 100 * seconds
+        assert times["stories"] > 1, "the story is read later"
+        chunks.append(len(read))
+        content.append(sum(read))
+    assert chunks[1] == pytest.approx(chunks[0], abs=3), "a block may begin within a chunk"
+    assert content[1] == pytest.approx(content[0], rel=0.1)
 
 
 def test_connections_that_ask_for_nothing_make_room(server: RecordingServer) -> None:

@@ -92,6 +92,40 @@ def test_stops_have_their_reasons(production: Production) -> None:
     assert sum(period.length for period in before) == pytest.approx(10.0, abs=0.011)
 
 
+def test_a_stop_commanded_during_a_failure_is_the_reason_after_the_repair(
+    production: Production, tmp_path: Path
+) -> None:
+    """The signal keeps the failure as the reason. The capper is repaired, and started again 5 s later."""
+    (failure,) = longest_stops(production.periods["machines/capper"], 1)
+    stop, start = (round(100 * (failure.begin + wait)) for wait in (2.0, failure.length + 5.0))
+    sim = Simulation(load_scene(FAILING_LINE))
+    with Recorder(tmp_path / "bag") as recorder:
+        outputs = OutputWriter(sim, [recorder], run_id="run")
+        outputs.start()
+        while sim.tick < start + 300:
+            if sim.tick in (stop, start):
+                sim.command(["machines/capper/run"], [float(sim.tick == start)], "plc")
+            sim.advance()
+            outputs.after_tick()
+    stopped = {
+        (period.category, period.why): period.length
+        for period in read_production(tmp_path / "bag").periods["machines/capper"]
+        if period.category in ("down", "idle")
+    }
+    assert stopped == {
+        ("down", "failure cap_feeder"): pytest.approx(12.0),
+        ("idle", "command run"): pytest.approx(5.0, abs=0.021),
+    }
+
+
+def test_a_repaired_machine_waits_for_its_neighbour(production: Production) -> None:
+    """Time behind the repair is starved or blocked as soon as the machine waits again."""
+    periods = production.periods["machines/capper"]
+    (failure,) = longest_stops(periods, 1)
+    assert {period.why for period in periods if period.begin >= failure.end} <= {"running", "starved", "blocked"}
+    assert any(period.category == "starved" for period in periods if period.begin >= failure.end)
+
+
 def test_bottles_of_the_report_are_those_of_the_counters(production: Production) -> None:
     counters = production.counters
     made = dict(zip(counters.name, zip(counters.processed, counters.defective, strict=True), strict=True))

@@ -25,6 +25,8 @@ from conveyor_sim.scene import load_scene
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.support.resources import scene_path
 
+ROOT = Path(__file__).resolve().parents[2]
+
 
 @pytest.mark.parametrize("path", SHIPPED, ids=shipped_name)
 def test_nothing_is_empty(path: Path) -> None:
@@ -115,3 +117,28 @@ def test_the_command() -> None:
     assert table.exit_code == 0 and "machines/filler/rate" in table.output and "Nominal: " in table.output
     wrong = CliRunner().invoke(main, ["tags", "nowhere"])
     assert wrong.exit_code == 1 and "no such scene file" in wrong.output
+
+
+@pytest.mark.parametrize("controller", ["table.st", "table.py:controller"])
+def test_alarms_of_a_controller_are_listed_with_the_others(tmp_path: Path, controller: str) -> None:
+    (tmp_path / "table.st").write_text((ROOT / "examples" / "st" / "table.st").read_text())
+    (tmp_path / "table.py").write_text(
+        "from conveyor_sim.control import Alarm\n\n"
+        "class controller:\n"
+        "    declared_alarms = (Alarm('table full', 'the table is full'),)\n"
+        "    def scan(self, inputs):\n"
+        "        return {}\n"
+    )
+    scene = ["tags", str(ROOT / "test" / "testing" / "table.yaml"), "--csv"]
+    plain = CliRunner().invoke(main, scene).output.splitlines()
+    listed = CliRunner().invoke(main, [*scene, "--controller", str(tmp_path / controller)]).output.splitlines()
+    (row,) = [line for line in listed if line not in plain]
+    assert [line for line in listed if line != row] == plain
+    assert "alarms/table full,bool,alarm" in row
+    assert ",alarm," in listed[listed.index(row) - 1], "behind the other alarms"
+
+
+def test_modbus_addresses_are_those_of_the_line_alone() -> None:
+    options = ["--modbus", "--controller", str(ROOT / "examples" / "st" / "table.st")]
+    refused = CliRunner().invoke(main, ["tags", "accumulation_table", *options])
+    assert refused.exit_code and "--modbus: given with --controller" in str(refused.exception) + refused.output

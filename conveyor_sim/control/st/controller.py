@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from conveyor_sim.control.recorded import patterns
-from conveyor_sim.control.scan import PROGRAM, ControlError, Inputs, LineTags
+from conveyor_sim.control.scan import ALARMS, PROGRAM, ControlError, Inputs, LineTags
 from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
@@ -81,6 +81,11 @@ class StructuredText:
         pairs = [(one.is_input, variables[one.variable], one.tag) for one in self.mapping.bound]
         self._ins = [(variable, tag) for is_input, variable, tag in pairs if is_input]
         self._outs = [(variable, tag) for is_input, variable, tag in pairs if not is_input]
+
+    @property
+    def alarm_tags(self) -> tuple[str, ...]:
+        """Tags of outputs that are alarms, available after `bind`."""
+        return tuple(dict.fromkeys(tag for _, tag in self._outs if tag.startswith(ALARMS)))
 
     @property
     def left_over(self) -> tuple[str, ...]:

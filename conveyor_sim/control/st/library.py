@@ -179,6 +179,11 @@ class CompiledProgram:
         return answer
 
     @property
+    def alarm_tags(self) -> tuple[str, ...]:
+        """Tags of outputs that are alarms, available after `bind`."""
+        return tuple(tag for tag in self._outs if tag.startswith(ALARMS))
+
+    @property
     def variables(self) -> Mapping[str, float]:
         """Variables with tags, as plc/<name>, after the last scan; 0 before the first one."""
         return self._shown

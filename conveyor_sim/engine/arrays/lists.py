@@ -40,6 +40,37 @@ class Near(NamedTuple):
 
 
 @group
+class CoarseList(NamedTuple):
+    """Pairs within one more skin than those of the pair list, from a search of the cells (`coarse.py`)."""
+
+    x: F8
+    """Positions at this search, (S,)."""
+    y: F8
+    radius: F8
+    """Radii at this search; -1: the slot was free, (S,)."""
+    number: I8
+    """Cells in the order of `Neighbourhood.order`, as one number each, (S,)."""
+    start: U4
+    """Slot i has j[start[i]:start[i + 1]], in order, j > i, (S + 1,)."""
+    j: U4
+    spent: I8
+    """Sum of strays over the rebuilds since this search, (1,); -1: search at the next rebuild."""
+    stray: I8
+    """Scratch of a rebuild: 1 if a bottle has moved too far since this search, or its slot has changed, (S,)."""
+    strays: U4
+    """Scratch of a rebuild: slots of strays, (S,)."""
+    cell_stray: I4
+    """Scratch of a rebuild: last stray in each hashed cell, (buckets,); -1: none."""
+    same_cell: I4
+    """Scratch of a rebuild: stray before in the same hashed cell, (S,)."""
+    last: I4
+    """Scratch of a rebuild: last pair of each slot with a stray, (S,); -1: none."""
+    before: I4
+    """Scratch of a rebuild: pair before of the same slot, and the other slot, by pair with a stray."""
+    other: U4
+
+
+@group
 class Neighbourhood(NamedTuple):
     """Data of a rebuild."""
 
@@ -59,6 +90,8 @@ class Neighbourhood(NamedTuple):
     sorted_y: F8
     sorted_radius: F8
     sorted_cell: I8
+    coarse: CoarseList | None
+    """None with integrators whose lists are rebuilt rarely."""
     home: I4
     """Scratch of a rebuild: cell of the static grid under each bottle, (S,); -1: none, or a free slot."""
 

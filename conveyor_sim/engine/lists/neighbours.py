@@ -15,6 +15,7 @@ from conveyor_sim.engine.arrays.types import I8, U4
 from conveyor_sim.engine.compiler.compile import kernel, part, written
 from conveyor_sim.engine.impulses.carry import store_pairs
 from conveyor_sim.engine.lists.cells import bucket_of, number_of, sort_into_cells
+from conveyor_sim.engine.lists.coarse import prepare_coarse
 
 
 @part
@@ -27,10 +28,35 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
         return 0
     _copy_springs(pairs, pairs.spring)
     store_pairs(pairs, pairs.impulse)
+    count, capacity = _find_pairs(bottles, hood, hood.coarse, pairs, cell, skin), pairs.i.size
+    pairs.used[0] = min(count, capacity)
+    _fill_radii(pairs, pairs.reach, bottles)
+    if count <= capacity:
+        _restore_springs(pairs, pairs.spring)
+    return count
+
+
+@part
+def _find_pairs(bottles: Bottles, hood: Neighbourhood, coarse: Any, pairs: Pairs, cell: float, skin: float) -> int:
+    """Write the pairs; return their number, which may exceed the capacity."""
+    if _is_prepared(bottles, hood, coarse, cell, skin):
+        return _filter_coarse(bottles, coarse, pairs, skin)
+    return _search_cells(bottles, hood, pairs, cell, skin)
+
+
+@part
+def _is_prepared(bottles: Bottles, hood: Neighbourhood, coarse: Any, cell: float, skin: float) -> bool:
+    if coarse is None:
+        return False
+    return prepare_coarse(bottles, hood, coarse, cell, skin)
+
+
+@part
+def _search_cells(bottles: Bottles, hood: Neighbourhood, pairs: Pairs, cell: float, skin: float) -> int:
+    """Find the pairs among bottles in adjacent cells."""
     sort_into_cells(bottles, hood, cell)
     buckets = hood.bucket.size - 1
-    capacity = pairs.i.size
-    count = 0
+    capacity, count = pairs.i.size, 0
     for i in range(bottles.x.size):
         if bottles.id[i] < 0:
             continue
@@ -51,10 +77,37 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
                         pairs.j[count] = j
                     count += near & (j > i)
         _sort(pairs, i, first, min(count, capacity))
-    pairs.used[0] = min(count, capacity)
-    _fill_radii(pairs, pairs.reach, bottles)
-    if count <= capacity:
-        _restore_springs(pairs, pairs.spring)
+    return count
+
+
+@part
+def _filter_coarse(bottles: Bottles, coarse: Any, pairs: Pairs, skin: float) -> int:
+    """Take the pairs from the coarse list, and those of strays from their lists."""
+    if coarse is None:
+        return 0
+    capacity, count = pairs.i.size, 0
+    for i in range(uint64(bottles.x.size)):
+        if bottles.id[i] < 0:
+            continue
+        first, x, y, radius = count, bottles.x[i], bottles.y[i], bottles.radius[i]
+        if coarse.stray[i] == 0:
+            for entry in range(uint64(coarse.start[i]), uint64(coarse.start[i + uint64(1)])):
+                j = coarse.j[entry]
+                dx = bottles.x[j] - x
+                dy = bottles.y[j] - y
+                reach = radius + bottles.radius[j] + skin
+                if count < capacity:
+                    pairs.i[count] = i
+                    pairs.j[count] = j
+                count += (dx * dx + dy * dy < reach * reach) & (coarse.stray[j] == 0)
+        pair = coarse.last[i]
+        if pair >= 0:
+            while pair >= 0:
+                if count < capacity:
+                    pairs.j[count] = coarse.other[pair]
+                count += 1
+                pair = coarse.before[pair]
+            _sort(pairs, i, first, min(count, capacity))
     return count
 
 

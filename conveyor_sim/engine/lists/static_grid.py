@@ -70,11 +70,11 @@ def find_homes(bottles: Bottles, grid: Any, home: I4) -> None:
     if grid is None:
         return
     for i in range(bottles.x.size):
-        home[i] = _cell(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
+        home[i] = cell_at(grid, bottles.x[i], bottles.y[i]) if bottles.id[i] >= 0 else -1
 
 
 @part
-def _cell(grid: Any, x: float, y: float) -> int:
+def cell_at(grid: Any, x: float, y: float) -> int:
     """Return the cell of the static grid under a point; -1 outside, where nothing of the plant is near."""
     if not (x >= grid.x and y >= grid.y):
         return -1

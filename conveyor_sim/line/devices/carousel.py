@@ -126,10 +126,13 @@ class CarouselDevice(BottleWork, Device):
     def _slot(self, pocket: int, turned: float, now: ScanContext) -> int:
         """Return the slot of the bottle in a pocket, -1 if it is empty."""
         x, y = self._wheel.pocket(pocket, turned)
-        bottles = now.state.world.bottles
-        apart = np.where(bottles.id >= 0, np.hypot(bottles.x - x, bottles.y - y), math.inf)
-        slot = int(apart.argmin())
-        return slot if apart[slot] <= WITHIN * self._wheel.part.pocket_radius else -1
+        bottles, reach = now.state.world.bottles, WITHIN * self._wheel.part.pocket_radius
+        near = np.flatnonzero((abs(bottles.x - x) <= reach) & (abs(bottles.y - y) <= reach) & (bottles.id >= 0))
+        if not near.size:
+            return -1
+        apart = np.hypot(bottles.x[near] - x, bottles.y[near] - y)
+        nearest = int(apart.argmin())
+        return int(near[nearest]) if apart[nearest] <= reach else -1
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the values in the order of the signals."""

@@ -122,7 +122,7 @@ class DriveDevice(SetpointDevice):
             super().command(name, value, now)
             return
         what = name.removeprefix(f"{self.name}/")
-        if what == "run" and (value != 0.0) == self.run:
+        if self._is_on(what) == (value != 0.0):
             return
         self.wake()
         if what == "run":
@@ -139,6 +139,14 @@ class DriveDevice(SetpointDevice):
             self.trip = value != 0.0
             self.tripped = self.tripped or self.trip
             now.alarm(self._tripped, self.tripped)
+
+    def _is_on(self, what: str) -> bool | None:
+        """Return the state of a command's switch; None for the fault `trip`."""
+        if what == "run":
+            return self.run
+        if what == "reverse":
+            return self.reverse
+        return self.reset.on if what == "reset" else None
 
     def rests(self, now: ScanContext) -> bool:
         """Return True at constant speed, without an encoder that counts."""

@@ -3,15 +3,11 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.arrays.types import F8, I8
-from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
-from conveyor_sim.engine.sensors.regions import find_inside
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import DeviceSetup
 from conveyor_sim.line.tag import count, number, switch
@@ -36,19 +32,15 @@ def most_inside(corners: Sequence[XY] | F8, radius: float) -> int:
 class Region:
     """Simple polygon."""
 
-    def __init__(self, corners: Sequence[XY]) -> None:
+    def __init__(self, corners: Sequence[XY], setup: DeviceSetup) -> None:
         """Store the corners, in order, m."""
         self.corners: NDArray[np.float64] = np.array(corners, dtype=np.float64)
-        self._slots: I8 = np.empty(0, dtype=np.int64)
-        self._find: Any = None
+        self._search = setup.regions
+        self._number = self._search.add(self.corners)
 
-    def inside(self, bottles: Bottles) -> I8:
+    def inside(self, now: ScanContext) -> I8:
         """Return the slots of bottles whose axes are inside, (n,). Valid until the next call."""
-        if self._slots.size < bottles.id.size:
-            self._slots = np.empty(bottles.id.size, dtype=np.int64)
-        arguments = self.corners, bottles.x, bottles.y, bottles.id, self._slots
-        self._find = self._find or entry(find_inside, *arguments)
-        return self._slots[: self._find(*arguments)]
+        return self._search.inside(self._number, now.state.world.bottles, now.state.moves)
 
 
 MOST_OFFSET = 1000.0
@@ -62,7 +54,7 @@ class ZoneDevice(Device):
     """Number of bottles with their axes in a region, and a switch for a full zone."""
 
     def __init__(self, name: str, zone: Zone, setup: DeviceSetup) -> None:
-        self._region, self._full_at = Region(zone.region), zone.full_at
+        self._region, self._full_at = Region(zone.region, setup), zone.full_at
         x, y = self._region.corners.T
         self._area = 0.5 * abs(float(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))))
         radius = float(setup.model.type_radius.min())
@@ -88,7 +80,7 @@ class ZoneDevice(Device):
 
     def count(self, now: ScanContext) -> int:
         """Return the displayed number of bottles, at least 0."""
-        return max(0, self._region.inside(now.state.world.bottles).size + self.offset)
+        return max(0, self._region.inside(now).size + self.offset)
 
     def full(self, now: ScanContext) -> bool:
         """Return True if the back-up switch is on; False without one."""
@@ -108,12 +100,12 @@ class OutfeedDevice(Device):
         super().__init__(
             name, [count(f"{name}/removed", "counter", "Bottles removed.", adds_to="removed").of("removed")]
         )
-        self._region = Region(outfeed.region)
+        self._region = Region(outfeed.region, setup)
         self.removed = 0
 
     def take(self, now: ScanContext) -> None:
         """Remove the bottles that are inside now."""
-        for slot in self._region.inside(now.state.world.bottles).tolist():
+        for slot in self._region.inside(now).tolist():
             now.state.remove(slot)
             self.removed += 1
 

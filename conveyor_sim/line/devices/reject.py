@@ -31,7 +31,7 @@ class RejectDevice(Device):
             ],
         )
         self._reject = reject
-        self._region = Region(reject.region)
+        self._region = Region(reject.region, setup)
         self._power = setup.power("machines", self)
         self.fire = RisingEdge()
         self.stop = False
@@ -57,14 +57,14 @@ class RejectDevice(Device):
 
     def rehearse(self, now: ScanContext) -> None:
         """Search the region."""
-        self._region.inside(now.state.world.bottles)
+        self._region.inside(now)
 
     def take(self, now: ScanContext) -> None:
         """Remove one bottle per stroke, within its window."""
         if not self.strokes:
             return
         bottles = now.state.world.bottles
-        targets = sorted((int(bottles.id[slot]), slot) for slot in self._region.inside(bottles).tolist())
+        targets = sorted((int(bottles.id[slot]), slot) for slot in self._region.inside(now).tolist())
         left = []
         for stroke in self.strokes:
             if now.time >= stroke - 1e-9 and targets:

@@ -130,8 +130,9 @@ class SetpointDevice(SpeedDevice):
 
     def take_setpoint(self, value: float, now: ScanContext) -> None:
         """Set the setpoint, m/s."""
-        self.wake()
-        now.setpoints[self._index] = value
+        if now.setpoints[self._index] != value:
+            self.wake()
+            now.setpoints[self._index] = value
 
     def rests(self, now: ScanContext) -> bool:
         """Return True if it has the speed of the setpoint."""

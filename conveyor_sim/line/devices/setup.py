@@ -11,6 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from conveyor_sim.engine.sensors.region_search import RegionSearch
 from conveyor_sim.line.device import Device
 from conveyor_sim.line.devices.entry import BottleEntry
 from conveyor_sim.line.devices.power import PowerSupply
@@ -41,6 +42,8 @@ class DeviceSetup:
         self.scene, self.model = scene, model
         self.devices: dict[str, Device] = {}
         """Devices by name, in the order in which they act."""
+        self.regions = RegionSearch()
+        """Search for the bottles in the regions of all devices."""
 
     def device(self, kind: type[D], name: str) -> D:
         """Return a device built before, `zones/exit`. Raise KeyError if there is none."""

@@ -33,7 +33,7 @@ class TakingDevice(MachineDevice):
     def __init__(self, name: str, part: TakingPart, setup: DeviceSetup, own: Sequence[Tag]) -> None:
         fills = () if part.start_fill is None else FILLS
         super().__init__(name, part, setup, own, (PackMLState.COMPLETING, *fills))
-        self._region = Region(part.region)
+        self._region = Region(part.region, setup)
         self._fill, self._zone_name, self._setup = part.start_fill or 0, part.start_zone, setup
         self._zone: ZoneDevice | None = None
         self._run_down_ticks = setup.ticks(part.run_down)
@@ -42,7 +42,7 @@ class TakingDevice(MachineDevice):
     def queue(self, now: ScanContext) -> Mapping[int, int]:
         """Update `waiting`, and return the slots of the waiting bottles by their ids."""
         bottles = now.state.world.bottles
-        slot_of = {int(bottles.id[slot]): slot for slot in self._region.inside(bottles).tolist()}
+        slot_of = {int(bottles.id[slot]): slot for slot in self._region.inside(now).tolist()}
         if slot_of.keys() != set(self.waiting):
             stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
             self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
@@ -61,14 +61,14 @@ class TakingDevice(MachineDevice):
 
     def _filled(self, now: ScanContext) -> int:
         if self._zone_name is None:
-            return self._region.inside(now.state.world.bottles).size
+            return self._region.inside(now).size
         if self._zone is None:  # zones are built after machines
             self._zone = self._setup.device(ZoneDevice, f"zones/{self._zone_name}")
         return self._zone.count(now)
 
     def rehearse(self, now: ScanContext) -> None:
         """Search the region."""
-        self._region.inside(now.state.world.bottles)
+        self._region.inside(now)
 
 
 class SinkDevice(TakingDevice):

@@ -112,6 +112,11 @@ class LayerMap:
             return rule is not None
         return rule.target.shape in ("line", "region", "place") and not self.blocks_of(layer)
 
+    @property
+    def ignores_all(self) -> bool:
+        """True if no rule makes a part, as in the map that `import --layers` prints."""
+        return all(rule.target.shape == "none" for rule in self.rules)
+
     def names(self, layer: str) -> bool:
         """Return True if the map names a layer."""
         return bool(self._of_layer(layer))

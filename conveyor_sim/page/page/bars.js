@@ -35,7 +35,8 @@ export class Bars {
 
   _span() {
     const { story, recording } = this.view;
-    return [Math.min(recording.start, story.events[0]?.time ?? recording.start), recording.end];
+    const { head: { times, tick }, start, end } = recording, first = story.events[0]?.time ?? start;
+    return [Math.min(start, times.began === undefined ? first : Math.min(first, times.began * tick)), end];
   }
 
   _jump(event) {

@@ -13,6 +13,7 @@ export class Camera extends EventTarget {
     this.y = (bounds[1] + bounds[3]) / 2;
     this.width = this.height = 1;
     this.under = 36; // px at the lower edge that the legend covers
+    this.over = 0; // px at the upper edge that a notice covers
     this.fitted = true; // true while it shows the complete plant, in a window of any size
     this.box = null; // part of the plant that it shows in a window of any size, until the user moves it
   }
@@ -36,19 +37,20 @@ export class Camera extends EventTarget {
     this._changed(false, box);
   }
 
-  // px: height of what covers the lower edge.
-  coverBelow(px) {
-    if (px === this.under) return;
-    this.under = px;
+  // under, over: heights of what covers the lower and the upper edge, px.
+  cover(under, over) {
+    if (under === this.under && over === this.over) return;
+    [this.under, this.over] = [under, over];
     this.resize(this.width, this.height);
   }
 
   _enclose([x0, y0, x1, y1]) {
     const margin = Math.min(MARGIN, 0.1 * Math.min(this.width, this.height));
+    const above = Math.max(margin, this.over), below = this.under + (this.over ? 0.4 : 1) * margin; // a notice takes its room from the margins
     this.x = (x0 + x1) / 2;
-    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - this.under - 2 * margin) / Math.max(y1 - y0, 0.01));
+    const fitting = Math.min((this.width - 2 * margin) / Math.max(x1 - x0, 0.01), (this.height - above - below) / Math.max(y1 - y0, 0.01));
     this.scale = Math.min(MOST, Math.max(1, fitting));
-    this.y = (y0 + y1 - this.under / this.scale) / 2;
+    this.y = (y0 + y1 + (above - below) / this.scale) / 2;
   }
 
   toX(x) {

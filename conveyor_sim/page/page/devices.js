@@ -68,6 +68,12 @@ function beltBelow({ surfaces }, mark) {
   return belts.get(mark);
 }
 
+// Returns true if other entries stand beside an entry on its belt.
+function hasNeighbour({ marks, surfaces }, mark) {
+  const belt = beltBelow({ surfaces }, mark), [[x, y]] = mark.points;
+  return belt !== null && marks.some((other) => other !== mark && other.look === "entry" && beltBelow({ surfaces }, other) === belt && Math.hypot(other.points[0][0] - x, other.points[0][1] - y) < belt.width);
+}
+
 // beyond: px by which the drawing exceeds its points.
 function label(view, camera, mark, note, importance, colour, beyond = 0) {
   const [x, y] = middle(mark.points), isLine = mark.points.length === 2, [from, to] = mark.points;
@@ -146,7 +152,13 @@ function drawEntry(context, camera, colours, view, mark, device) {
   context.strokeStyle = colours.halo;
   context.stroke();
   const isStation = mark.kind === "station"; // its region shows its name and state
-  if (!isStation) label(view, camera, mark, now ? now.name : "", 6, colours.ink);
+  if (isStation) return;
+  const name = now ? now.name : "";
+  if (!hasNeighbour(view.recording.head, mark)) label(view, camera, mark, name, 6, colours.ink);
+  else { // a name at the edge of the belt would stand beside another entry
+    const [bx, by] = at(-0.55 * size, 0), towards = outside(mark.direction + Math.PI);
+    view.labels.add(device, short(mark.name) + name, bx, by, { importance: view.device === device ? CHOSEN : 6, reach: 0.55 * size, colour: colours.ink, bold: true, towards });
+  }
 }
 
 // Returns the ends of a moving rail.

@@ -5,6 +5,7 @@ import { fillAlarms } from "./alarms.js";
 import { controlsOf } from "./controls.js";
 import { element, seconds, shown, titled, warn } from "./dom.js";
 import { restrict } from "./rights.js";
+import { EXECUTE } from "./story.js";
 
 const ORDER = ["status", "actual", "counter", "alarm", "panel", "command", "setpoint", "fault"];
 const TITLES = { status: "Status", actual: "Values", counter: "Counters", alarm: "Alarm counts", panel: "Panel", command: "Commands", setpoint: "Setpoints", fault: "Faults" };
@@ -110,7 +111,10 @@ export class Faceplate {
 
   // Returns the value of a tag in a recording, and a remark on it.
   _now(tag, { view: { recording, story, clock }, signal, command }, { forced, faults }) {
-    if (signal !== undefined) return [recording.at("signals", signal, clock.time), forced.has(tag.name) ? "forced" : ""];
+    if (signal !== undefined) {
+      const isPast = tag.name.endsWith("/stop_reason") && recording.signal(tag.name.replace(/stop_reason$/, "state"), clock.time) === EXECUTE;
+      return [recording.at("signals", signal, clock.time), forced.has(tag.name) ? "forced" : isPast ? "of the last stop" : ""];
+    }
     if (command >= 0) {
       const read = story.readBackAt(command, clock.time);
       return read ? [read.value, `by ${read.writer} since ${seconds(read.since)}`] : [tag.initial, ""];

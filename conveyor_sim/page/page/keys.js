@@ -36,12 +36,19 @@ export function listenToKeys(view) {
     b: () => view.nextBottle(1), B: () => view.nextBottle(-1), f: () => view.setFollowing(!view.following), c: () => view.nextColouring(), h: () => view.nextHeat(), t: () => byId("toggle_trends").click(),
     Escape: () => view.letGo(), "?": () => dialog.showModal(),
   };
+  let pointed = false; // true while a pointer set the focus: Space plays, and does not press the clicked button again
+  addEventListener("pointerdown", () => { pointed = true; }, true);
+  const plays = (event) => event.key === " " && pointed;
+  addEventListener("keyup", (event) => {
+    if (plays(event) && event.target.matches("button")) event.preventDefault(); // Firefox presses a button then
+  });
   addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || dialog.open) return;
     const target = event.target, typing = target.matches("input:not([type=checkbox]), select");
     const pressing = target.matches("button, input[type=checkbox], [role=tab], [role=button]") && [" ", "Enter"].includes(event.key);
     const tabbing = target.matches("[role=tab]") && event.key.startsWith("Arrow");
-    if (typing || pressing || tabbing) return;
+    if (tabbing || event.key === "Tab") pointed = false;
+    if (typing || tabbing || (pressing && !plays(event))) return;
     const digit = /^[0-9]$/.test(event.key);
     const action = digit ? () => seek(recording.start + (+event.key / 10) * (recording.end - recording.start)) : actions[event.key] ?? actions[event.key.toLowerCase()];
     if (!action) return;

@@ -115,6 +115,17 @@ export class Recording extends EventTarget {
     return null;
   }
 
+  // Returns the time of the last frame up to a time; `from`: of the first frame from that time on. Null while it loads.
+  frameTime(time, from) {
+    const at = this.place(time);
+    if (!at) return null;
+    const { number, block, frame } = at, last = block.times[frame];
+    if (!from || last > time - NEAR) return last;
+    if (frame + 1 < block.times.length) return block.times[frame + 1];
+    const next = number + 1 < this.count ? this.block(number + 1) : block;
+    return next && (next === block ? last : next.times[0] ?? last);
+  }
+
   // Returns the time of the frame some steps after that of a time; null while it loads.
   async stepped(time, steps) {
     await this.load(this.number(time));

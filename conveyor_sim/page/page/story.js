@@ -17,7 +17,8 @@ const STANDS = new Set([1, 2, 4, 5, 9, 11]);
 export const isStanding = (state) => STANDS.has(state);
 const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 
-const EXECUTE = 6;
+export const EXECUTE = 6;
+const HOLDING = 10, HELD = 11;
 const WAITS = new Set(["starved", "blocked"]);
 const OF_MACHINE = /^(.*)\/(\w+)$/;
 
@@ -90,7 +91,7 @@ export class Story {
     this.rejected = new Set();
     this.left = new Map(); // by bottle, the event by which it left
     this.machines = new Map(); // by machine, times of state changes
-    this.reasons = new Map(); // reasons of stops by machine and time
+    this.reasons = new Map(); // by machine, times and texts of its stop reasons
     const now = new Map();
     for (const event of this.events) {
       if (COMES.has(event.kind)) this.fed.set(event.bottle, event.time);
@@ -102,7 +103,7 @@ export class Story {
     for (const [time, number, state, active, firstOut, since, by] of data.alarm_changes) {
       if (!this.alarms.has(number)) this.alarms.set(number, { times: [], states: [], ...data.alarms[number] });
       const alarm = this.alarms.get(number);
-      alarm.times.push(time);
+      alarm.times.push(since > (alarm.times.at(-1) ?? -Infinity) ? Math.min(since, time) : time); // messages may come later than a change
       alarm.states.push({ state, active, firstOut, since, by });
     }
     this.counterTimes = data.counters.map((entry) => entry.at);
@@ -124,15 +125,26 @@ export class Story {
   // Returns the new state of an event in words, with its reason if known.
   whyOf({ name, time, value }) {
     const [, device] = OF_MACHINE.exec(name);
-    const change = this.machines.get(device)?.find((other) => other.time === time), reason = this.reasons.get(`${device} ${time}`) ?? "";
+    const change = this.machines.get(device)?.find((other) => other.time === time), reason = this._reasonAt(device, time, value);
     const text = stateName(value, change?.category);
     return value !== EXECUTE && reason && !WAITS.has(reason) ? `${text}, ${reason}` : text;
+  }
+
+  // A failure with the reason of the one before it changes the state only, so that reason continues.
+  _reasonAt(device, time, state) {
+    const { times, texts } = this.reasons.get(device) ?? { times: [], texts: [] }, last = lastUpTo(times, time);
+    return last >= 0 && (times[last] === time || state === HOLDING || state === HELD) ? texts[last] : "";
   }
 
   // now: last state of each machine.
   _state({ name, time, value, text }, now) {
     const [, device, what] = OF_MACHINE.exec(name) ?? [];
-    if (what === "stop_reason") this.reasons.set(`${device} ${time}`, text);
+    if (what === "stop_reason") {
+      const reasons = this.reasons.get(device) ?? { times: [], texts: [] };
+      reasons.times.push(time);
+      reasons.texts.push(text);
+      this.reasons.set(device, reasons);
+    }
     if (what !== "state" && what !== "category") return;
     const before = now.get(device) ?? this.initially(device), changes = this.machines.get(device) ?? [];
     const after = { ...before, [what]: what === "state" ? value : categoryOf(value) };

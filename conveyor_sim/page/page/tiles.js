@@ -14,6 +14,15 @@ export class Tiles {
     this.drawn = null;
   }
 
+  // Returns the category of a machine that does not run, with its reason.
+  _why(name, { category, stop_reason }) {
+    const { story, clock, recording: { head } } = this.view;
+    if ([category, "none"].includes(stop_reason)) return category;
+    const isOver = category === "idle" && !stop_reason.startsWith("command"); // a failure stays the reason of a commanded stop
+    const isOff = isOver && story.readBackAt(head.commands.indexOf(`${name}/run`), clock.time)?.value === 0;
+    return `${category}: ${isOff ? "command run" : isOver ? `after ${stop_reason}` : stop_reason}`;
+  }
+
   draw() {
     const { story, clock, recording } = this.view, entry = story.countersAt(clock.time);
     if (entry === this.drawn && entry !== null) return;
@@ -43,7 +52,7 @@ export class Tiles {
           ...[["availability", inPercent(row.availability)], ["effectiveness", inPercent(row.effectiveness)], ["quality", inPercent(row.quality)],
             ["bottles", `${row.processed}`]].filter(([, value]) => value !== NONE).flatMap(([term, value]) => [element("dt", {}, term), element("dd", {}, value)])),
         all ? bar : null,
-        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, [row.category, "none"].includes(row.stop_reason) ? row.category : `${row.category}: ${row.stop_reason}`) : null);
+        row.stop_reason && row.category !== "running" ? element("p", { class: "muted" }, this._why(name, row)) : null);
     }));
     this.key.replaceChildren(...keyOf(Object.entries(CATEGORIES).filter(([name]) => seen.has(name)).map(([name, colour]) => [colour, name])));
   }

@@ -86,7 +86,7 @@ export class View {
       one.addEventListener("failed", (event) => warn(event.detail));
     }
     this.link = new Link(this);
-    this.snapping = false;
+    this.snapping = null;
   }
 
   touch() {
@@ -145,7 +145,7 @@ export class View {
   }
 
   _loaded() {
-    if (this.snapping) this.snap();
+    if (this.snapping) this.snap(this.snapping.from);
     this._measure();
     this.touch();
   }
@@ -168,12 +168,12 @@ export class View {
     this.touching ||= forces.length > 0;
   }
 
-  // Holds the time at a frame of the recording, once it is loaded.
-  snap() {
+  // Holds the time at a frame of the recording, once it is loaded. from: at the first one from the time on.
+  snap(from = false) {
     if (this.clock.playing) return;
-    const at = this.clock.recording.place(this.clock.time);
-    this.snapping = !at;
-    if (at && this.clock.time !== at.block.times[at.frame]) this.clock.seek(at.block.times[at.frame]);
+    const time = this.clock.recording.frameTime(this.clock.time, from);
+    this.snapping = time === null ? { from } : null;
+    if (time !== null && this.clock.time !== time) this.clock.seek(time);
   }
 
   // Returns the distance of a bottle from its position in the other recording, m; infinite if it is not there.
@@ -193,10 +193,13 @@ export class View {
     this.touch();
   }
 
-  // Jumps to a time, and to the place of a tag or a bottle.
+  // Jumps to a time, at whose end its events have happened, and to the place of a tag or a bottle.
   jump(time, tag = "", bottle = -1) {
+    const { start } = this.clock.recording;
     this.clock.pause();
     this.clock.seek(time);
+    if (!this.line) this.snap(true);
+    if (time < start - 1e-6) say(`${seconds(time)} is before the shown part, which begins at ${seconds(start)}.`);
     if (bottle >= 0) this.selectBottle(bottle, false);
     const { bodies, marks, movers, surfaces } = this.recording.head;
     const devices = [...marks.map(deviceOf), ...[...movers, ...bodies].map(({ name }) => name), ...surfaces.map(({ name }) => `belts/${name}`)];
@@ -315,13 +318,14 @@ export class View {
     }
     if (lines) entries.push(element("span", { class: "entry" }, "contacts 0 ", element("span", { class: "wedge" }), ` ${+this.strongest.toPrecision(2)} N`));
     byId("legend").replaceChildren(...entries);
-    this._coverBelow();
+    this._coverEdges();
     this._cover();
   }
 
-  // The legend and the buttons cover a part of the lower edge.
-  _coverBelow() {
-    this.camera.coverBelow(Math.max(byId("legend").offsetHeight, byId("zoom").offsetHeight));
+  // The legend and the buttons cover a part of the lower edge, and a failure covers a part of the upper one.
+  _coverEdges() {
+    const news = byId("news"), failed = news.className === "wrong" && this.plans.length === 1;
+    this.camera.cover(Math.max(byId("legend").offsetHeight, byId("zoom").offsetHeight), failed ? news.offsetTop + news.offsetHeight : 0);
   }
 
   // Names on the plan move aside from what covers it.
@@ -346,13 +350,14 @@ export class View {
   resize() {
     const { clientWidth, clientHeight } = byId("stage");
     this.minimap.resize(clientWidth, clientHeight);
-    this._coverBelow();
+    this._coverEdges();
     this.beside?.resize();
     this.plan.resize();
     this.touch();
   }
 
   draw(now) {
+    if (this.plan.said !== byId("notice").textContent) this._coverEdges();
     for (const plan of this.plans) {
       plan.update();
       plan.view.heat.update(now);

@@ -24,7 +24,7 @@ from conveyor_sim.engine.arrays.impulses import (
     WorkScratch,
 )
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
-from conveyor_sim.engine.arrays.lists import Near, NearSprings, Neighbourhood
+from conveyor_sim.engine.arrays.lists import CoarseList, Near, NearSprings, Neighbourhood
 from conveyor_sim.engine.arrays.moving import MovingBodies
 from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.riding import Riding
@@ -75,6 +75,29 @@ def empty_pairs(model: Model, entries: int) -> Pairs | None:
 
 def _pair_parts(entries: int) -> PairParts:
     return PairParts(_triple(2 * entries + 1), _triple(2 * entries + 1))
+
+
+def _coarse_list(slots: int, buckets: int) -> CoarseList:
+    """Return a coarse list that is searched at the next rebuild. The room suffices for bottles of similar radii."""
+    same_cell, last = np.full((2, slots), -1, np.int32)
+    x, y, radius = np.zeros((3, slots))
+    entries = 8 * slots
+    return CoarseList(
+        x=x,
+        y=y,
+        radius=radius,
+        number=np.zeros(slots, np.int64),
+        start=np.zeros(slots + 1, np.uint32),
+        j=np.zeros(entries, np.uint32),
+        spent=np.full(1, -1, np.int64),
+        stray=np.zeros(slots, np.int64),
+        strays=np.zeros(slots, np.uint32),
+        cell_stray=np.full(buckets, -1, np.int32),
+        same_cell=same_cell,
+        last=last,
+        before=np.zeros(entries, np.int32),
+        other=np.zeros(entries, np.uint32),
+    )
 
 
 def empty_near(model: Model, slots: int, entries: int) -> Near:
@@ -134,6 +157,7 @@ def empty_world(model: Model, slots: int) -> World:
             sorted_y=reals(),
             sorted_radius=reals(),
             sorted_cell=np.zeros(slots, np.int64),
+            coarse=_coarse_list(slots, buckets) if model.integrator in SWEPT else None,
             home=np.zeros(slots, np.int32),
         ),
         probe=GuardProbe(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),

@@ -41,6 +41,8 @@ class State:
         self._removed: list[int] = []
         self.held: dict[int, Held] = {}
         """Bottles held by machines, by id. They are not on the line."""
+        self.moves = 0
+        """Number of changes of positions: by ticks, by bottles that were added, and by edits."""
 
     def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
         """Put a new bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot. Return its id."""
@@ -92,6 +94,7 @@ class State:
             # Free slots cost as much as bottles in every loop.
             self._resize(slots + max(FIRST_SLOTS, slots // 32))
         slot = heapq.heappop(self._free)
+        self.moves += 1
         bottles = self.world.bottles
         bottles.x[slot], bottles.y[slot] = x, y
         bottles.vx[slot], bottles.vy[slot] = vx, vy
@@ -164,6 +167,7 @@ class State:
         """
         slots = other.world.bottles.id.size
         self.world, self.next_id = empty_world(self.model, slots), other.next_id
+        self.moves += 1
         none = tuple(0.0 for _ in self._loads())
         self.held = {bottle: (kind, theta, none) for bottle, (kind, theta, _) in other.held.items()}
         bottles, theirs = self.world.bottles, other.world.bottles
@@ -185,6 +189,7 @@ class State:
         world = with_arrays(self.world, arrays)
         require_valid(world, self.model, next_id)
         self.world, self.next_id, self.held = world, next_id, dict(held)
+        self.moves += 1
         loads = sum(1 for _ in self._loads())
         valid = all(
             0 <= bottle < next_id and 0 <= kind < len(self.model.bottle_types) and len(borne) == loads

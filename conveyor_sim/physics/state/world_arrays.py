@@ -75,6 +75,7 @@ UNCHECKED = (
     "moving.springs.aside",
     *(f"implicit.{name}" for name in ("mobility", "closed", "compliance")),
     "probe.depth",
+    "neighbourhood.coarse.",
     *(f"pairs.{name}" for name in ("fx", "fy", "moment", "normal", "touch", "tangent.", "parts.", "law.")),
     *(f"pairs.{name}" for name in ("reach", "radius_i")),
     *(f"ledger.{name}" for name in ("damping.", "friction.", "base.", "belt_power", "rail_power", "power")),

@@ -42,7 +42,13 @@ def require_valid(world: World, model: Model, next_id: int) -> None:
         "slots.more_start",
     ):
         _require_starts(name, arrays)
-    for name in ("railed.first", "belts.uncertain.first", "neighbourhood.bucket", "pairs.impulse.start"):
+    for name in (
+        "railed.first",
+        "belts.uncertain.first",
+        "neighbourhood.bucket",
+        "pairs.impulse.start",
+        "neighbourhood.coarse.start",
+    ):
         _require_starts(name, arrays)
     _require_bottles(world, model)
 
@@ -129,6 +135,19 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
             "impulses.bodies.leaves": (0, LEFT),
             "impulses.bodies.kind": (0, world.impulses.rail_constants.size - 1),
         }
+    if (coarse := world.neighbourhood.coarse) is not None:
+        limits |= {
+            "neighbourhood.coarse.start": (0, coarse.j.size),
+            "neighbourhood.coarse.j": (0, slots - 1),
+            "neighbourhood.coarse.spent": (-1, slots),
+            "neighbourhood.coarse.stray": (0, 1),
+            "neighbourhood.coarse.strays": (0, slots - 1),
+            "neighbourhood.coarse.cell_stray": (-1, -1),
+            "neighbourhood.coarse.same_cell": (-1, slots - 1),
+            "neighbourhood.coarse.last": (-1, coarse.other.size - 1),
+            "neighbourhood.coarse.before": (-1, coarse.other.size - 1),
+            "neighbourhood.coarse.other": (0, slots - 1),
+        }
     if world.belts is not None:
         limits["belts.start"] = (0, world.belts.candidate.size)
     if world.pairs is not None:
@@ -179,7 +198,7 @@ def ranges(world: World, model: Model, next_id: int) -> dict[str, tuple[int, int
 
 def indices(arrays: Arrays) -> set[str]:
     """Return the names of the integer arrays that must lie in a range. Others are only compared."""
-    free = ("neighbourhood.cell", "neighbourhood.sorted_cell", "damage.impacts.")
+    free = ("neighbourhood.cell", "neighbourhood.sorted_cell", "neighbourhood.coarse.number", "damage.impacts.")
     return {name for name, array in arrays.items() if array.dtype.kind in "iu" and not name.startswith((*FIXED, *free))}
 
 

@@ -104,6 +104,7 @@ class Integration:
         if self._state.world.vibration is not None:
             start_tick(self._state.world.vibration, seconds)
         began = time.perf_counter()
+        self._state.moves += 1
         self._take_steps(1)
         took = time.perf_counter() - began
         self._kernel_seconds += took

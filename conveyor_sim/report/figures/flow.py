@@ -90,6 +90,7 @@ def force_figure(force: PeakForceSeries) -> Figure:
             ha="right" if late else "left",
             va="center",
             fontsize=9.0,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.8},  # readable over the curves
         )
         ax.plot(force.time[peak], force.largest[peak], "o", color=style.SERIES[1], markersize=4.0)
     figure.legend(loc="outside upper right", ncols=2)

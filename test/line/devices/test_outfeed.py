@@ -21,9 +21,9 @@ def winding(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def in_polygon(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return whether bottles at (x, y) are inside."""
-    slots = np.empty(x.size, np.int64)
+    slots, every = np.empty(x.size, np.int64), np.arange(x.size)
     inside = np.zeros(x.size, dtype=bool)
-    inside[slots[: find_inside(corners, x, y, np.arange(x.size), slots)]] = True
+    inside[slots[: find_inside(corners, x, y, every, every, 0, x.size, slots)]] = True
     return inside
 
 

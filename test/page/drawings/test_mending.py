@@ -184,6 +184,9 @@ def test_the_layers_are_listed_as_a_map(tmp_path: Path) -> None:
     ]
     (tmp_path / "map.yaml").write_text(result.output)
     assert [rule.layer for rule in read_map(tmp_path / "map.yaml").rules] == ["#1 AXES", "EYES"]
+    options = ["--map", str(tmp_path / "map.yaml"), "-o", str(tmp_path / "plan.yaml")]
+    refusal = CliRunner().invoke(main, ["import", str(tmp_path / "plan.dxf"), *options])
+    assert "every layer is ignored, expected another kind" in str(refusal.exception) + refusal.output
 
 
 @pytest.mark.parametrize(

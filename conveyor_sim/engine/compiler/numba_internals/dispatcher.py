@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Numba's dispatcher of a kernel or part. Calls from other kernels compile it for the members that it reads."""
+"""Numba's dispatcher of a kernel or part. It is compiled for the members that it reads."""
 
 from functools import cached_property
 from typing import Any
@@ -22,21 +22,30 @@ class KernelDispatcher(CPUDispatcher):
         """Paths of members that the function reads, by argument."""
         return reads(self.py_func)
 
+    def narrow(self, types: Any) -> tuple[Any, ...]:
+        """Return types of arguments with all members hidden that the function does not read."""
+        return tuple(narrowed(one, paths) for one, paths in zip(types, self.reads, strict=True))
+
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """Compile for a call from a kernel. Numba calls this when it infers the types of the call."""
         compiler: Any = vars(self)["_compiler"]
         _, types = compiler.fold_argument_types(args, kws)
-        pairs = zip(types, self.reads, strict=True)
-        return super().get_call_template(tuple(narrowed(one, paths) for one, paths in pairs), {})
+        return super().get_call_template(self.narrow(types), {})
 
     def compile(self, sig: Any) -> Any:
         """Compile for arguments of these types; other processes wait for it instead of compiling the same."""
+        narrow = self.narrow(sig)
         try:
-            return super().compile(sig)
+            entry = super().compile(narrow)
         finally:
             cache = vars(self)["_cache"]
             if isinstance(cache, KernelCache):
                 cache.release()
+        if narrow != sig:
+            # A call from Python is found by the types of its arguments, with all members.
+            dispatcher: Any = self
+            dispatcher._insert([one._code for one in sig], entry, False)
+        return entry
 
 
 def kernel_dispatcher(function: Any, folder: KernelFolder) -> Any:

@@ -29,7 +29,7 @@ def address(function: Any, *arguments: Any) -> int:
 
 def _compiled(function: Any, *arguments: Any) -> Any:
     """Return numba's CompileResult for arguments of these types; compile the kernel unless it is cached."""
-    types = tuple(_typeof(argument) for argument in arguments)
+    types = function.narrow(_typeof(argument) for argument in arguments)
     with _rare_garbage_collection():
         function.compile(types)
     return function.overloads[types]
