@@ -171,11 +171,11 @@ class BottlingLine:
         return LineStep.EMPTYING
 
 
-def brewery(buffer: float = 9.0, started: bool = False) -> Controller:
+def brewery(supply: float = 14.0, buffer: float = 9.0, started: bool = False) -> Controller:
     """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject.
 
-    buffer: length of each wide conveyor behind the block, m, the scene's parameter. started: the line runs from the
-    first scan, without the start button.
+    supply, buffer: lengths of the wide conveyors before and behind the block, m, the scene's parameters.
+    started: the line runs from the first scan, without the start button.
     """
     belts = ("supply", "spread", "filled", "leaving", "cold", "wide", "packing")
     cells = ("single", "label")
@@ -205,14 +205,14 @@ def brewery(buffer: float = 9.0, started: bool = False) -> Controller:
         stroke=0.03,
         pulses_per_metre=2000.0,
     )
-    return together(line, v_curve(buffer), reject)
+    return together(line, v_curve(supply, buffer), reject)
 
 
-def v_curve(buffer: float) -> VCurve:
-    """Return the rates of the machines around the filler block of `brewery.yaml`. Levels behind it suit its buffers."""
+def v_curve(supply: float, buffer: float) -> VCurve:
+    """Return the rates of the machines around the filler block of `brewery.yaml`, with levels that suit the lengths."""
 
     def neighbour(machine: str, zone: str, *levels: float) -> Neighbour:
-        size = 1.0 if zone == "supply" else buffer / 9.0
+        size = supply / 14.0 if zone == "supply" else buffer / 9.0
         low, target, high = (level * size for level in levels)
         return Neighbour(f"machines/{machine}/rate", Count(f"zones/{zone}/bottles"), low, target, high)
 
