@@ -31,29 +31,55 @@ class LineStep(IntEnum):
     """The source stands, and the line runs until it is empty. Then the format changes."""
 
 
-@dataclass(frozen=True)
+@dataclass
 class Combiner:
-    """Combiner, slower while a queue behind it reaches the photo-eye `queued`, and standing while it reaches `full`."""
+    """Control of a combiner by the queue in the lane behind it.
+
+    The feed is slower while the queue reaches the photo-eye `queued`, and stands while it reaches `full`. All stands
+    while it reaches `backed`. Bottles that stand on running chains, with none behind them in the lane, have wedged: the
+    chains run backward for a moment.
+    """
 
     cell: str
     supply: str
     """Belt before the cell."""
     speeds: tuple[float, float]
     """Full speeds of this belt and of the feed, m/s."""
-    slower: float = 0.72
-    """Share of these speeds while a queue stands in the lane."""
+    slower: float = 0.65
+    """Share of these speeds while the queue reaches `queued`."""
+    stuck: int = 100
+    """Time after which standing bottles have wedged, scans."""
+    clearing: int = 300
+    """Time to clear them, scans. In its first half, the chains run backward."""
+    _stuck: int = 0
+    _clearing: int = 0
 
-    def commands(self, inputs: Inputs, runs: bool) -> Mapping[str, float]:
+    def scan(self, inputs: Inputs, runs: bool) -> Mapping[str, float]:
         """Return the commands of its belts in one scan."""
-        clear = inputs[f"photo_eyes/{self.cell}_full/blocked"] == 0.0
-        share = 1.0 if inputs[f"photo_eyes/{self.cell}_queued/blocked"] == 0.0 else self.slower
-        feed, chains = f"{self.cell}_feed", f"{self.cell}_chains"
+
+        def covered(eye: str) -> bool:
+            return inputs[f"photo_eyes/{self.cell}_{eye}/blocked"] != 0.0
+
+        backed = covered("backed")
+        wedged = covered("standing") and not covered("entered") and not backed
+        if self._clearing:
+            self._clearing -= 1
+        else:
+            self._stuck = self._stuck + 1 if wedged else 0
+        if self._stuck > self.stuck:
+            self._stuck, self._clearing = 0, self.clearing
+        if not runs:
+            self._stuck = self._clearing = 0
+        feeds = runs and not backed and not covered("full") and not self._clearing
+        share = self.slower if covered("queued") else 1.0
+        feed, chains = f"belts/{self.cell}_feed", f"belts/{self.cell}_chains"
         return {
-            **{f"belts/{belt}/run": float(runs and clear) for belt in (self.supply, feed, chains)},
-            **{
-                f"belts/{belt}/cmd_speed": share * speed
-                for belt, speed in zip((self.supply, feed), self.speeds, strict=True)
-            },
+            f"belts/{self.supply}/run": float(feeds),
+            f"belts/{self.supply}/cmd_speed": share * self.speeds[0],
+            f"{feed}/run": float(feeds),
+            f"{feed}/cmd_speed": share * self.speeds[1],
+            f"{chains}/run": float(runs and not backed),
+            f"{chains}/reverse": float(2 * self._clearing > self.clearing),
         }
 
 
@@ -78,6 +104,8 @@ class BottlingLine:
     """Signals whose sum is the number of bottles on the line."""
     formats: Sequence[Mapping[str, float]]
     """Commands by position of the selector."""
+    started: bool = False
+    """Run from the first scan."""
     remainder: float = 23.0
     """Largest number of bottles on an empty line, fewer than a case."""
     warning: int = 100
@@ -89,6 +117,10 @@ class BottlingLine:
     _waited: int = 0
     _ready: bool = True
     _start: bool = field(default=True)
+
+    def __post_init__(self) -> None:
+        if self.started:
+            self._step = LineStep.RUNNING
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return the commands of one scan."""
@@ -110,7 +142,7 @@ class BottlingLine:
         for belt in self.belts:
             commands[f"belts/{belt}/run"] = float(runs)
         for combiner in self.combiners:
-            commands.update(combiner.commands(inputs, runs))
+            commands.update(combiner.scan(inputs, runs))
         for machine in self.machines:
             commands[f"machines/{machine}/run"] = float(runs)
         for machine in (self.source, *self.machines):
@@ -139,8 +171,12 @@ class BottlingLine:
         return LineStep.EMPTYING
 
 
-def brewery() -> Controller:
-    """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject."""
+def brewery(supply: float = 14.0, buffer: float = 9.0, started: bool = False) -> Controller:
+    """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject.
+
+    supply, buffer: lengths of the wide conveyors before and behind the block, m, the scene's parameters.
+    started: the line runs from the first scan, without the start button.
+    """
     belts = ("supply", "spread", "filled", "leaving", "cold", "wide", "packing")
     cells = ("single", "label")
     line = BottlingLine(
@@ -150,7 +186,7 @@ def brewery() -> Controller:
         source="depalletiser",
         machines=("rinser", "pasteuriser", "labeller", "packer"),
         belts=("spread", "filled", "leaving", "wide", "packing", *(f"{cell}_lane" for cell in cells)),
-        combiners=(Combiner("single", "supply", (0.05, 0.12)), Combiner("label", "cold", (0.055, 0.12))),
+        combiners=(Combiner("single", "supply", (0.046, 0.12)), Combiner("label", "cold", (0.05, 0.12))),
         bottles=(
             *(f"belts/{belt}/bottles" for belt in (*belts, "block_infeed", "block_discharge")),
             *(f"belts/{cell}_{belt}/bottles" for cell in cells for belt in ("feed", "chains", "lane")),
@@ -158,6 +194,7 @@ def brewery() -> Controller:
             "zones/layer/bottles",
         ),
         formats=({"machines/depalletiser/cmd_bottle": 0.0}, {"machines/depalletiser/cmd_bottle": 1.0}),
+        started=started,
     )
     reject = TrackedReject(
         belt="label_lane",
@@ -168,13 +205,15 @@ def brewery() -> Controller:
         stroke=0.03,
         pulses_per_metre=2000.0,
     )
-    return together(line, v_curve(), reject)
+    return together(line, v_curve(supply, buffer), reject)
 
 
-def v_curve() -> VCurve:
-    """Return the rates of the machines around the filler block of `brewery.yaml`."""
+def v_curve(supply: float, buffer: float) -> VCurve:
+    """Return the rates of the machines around the filler block of `brewery.yaml`, with levels that suit the lengths."""
 
-    def neighbour(machine: str, zone: str, low: float, target: float, high: float) -> Neighbour:
+    def neighbour(machine: str, zone: str, *levels: float) -> Neighbour:
+        size = supply / 14.0 if zone == "supply" else buffer / 9.0
+        low, target, high = (level * size for level in levels)
         return Neighbour(f"machines/{machine}/rate", Count(f"zones/{zone}/bottles"), low, target, high)
 
     return VCurve(

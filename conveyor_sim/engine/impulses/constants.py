@@ -3,8 +3,8 @@
 
 With 1/m_n the inverse masses along the normal and 1/m_t those along the tangent, rotation included, an implicit step of
 a spring k and a dashpot c has the compliance 1/(h^2 k), and 1/(1 + c/(h k)) of the overlap acts. A contact that the
-substep resolves, h^2 k/m_n < RESOLVED, is such a step. Others take only CORRECTED of the remaining overlap or gap as
-velocity, because more would make long files and crowds oscillate, and the positions are moved by MOVED of it.
+substep resolves, h^2 k/m_n < RESOLVED, is such a step. Others take only CORRECTED of the remaining overlap as velocity,
+because more would make long files oscillate, and the positions move apart by MOVED of it.
 """
 
 import math

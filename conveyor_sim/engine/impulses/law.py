@@ -6,8 +6,8 @@ step of spring and dashpot along n, and of the friction curve along t, at most m
 that closes faster than `threshold` and holds no impulse is an impact: it rebounds with e, and the bodies move back to
 the moment of touch. An impact may follow another only after WAIT visits; otherwise endless impacts would carry a load.
 
-A contact that holds no impulse may close its gap in the step. One that bears closes a gap as slowly as it opens an
-overlap: if its impulse closed gaps at once, the friction in crowds would feed waves.
+A contact that holds no impulse may close its gap in the step. One that bears closes it slowly. Without this limit it is
+an integral controller, and the friction in crowds feeds waves.
 
 There are no branches, so the loop over pairs is vectorised.
 """
@@ -19,6 +19,12 @@ WAIT = 3.0
 
 NEAR = 1e-4
 """Gap across which a contact that holds an impulse still bears, m."""
+
+CLOSING = 1.5e-5
+"""Largest speed at which a contact that bears closes a gap, as a share of that at which it corrects an overlap."""
+
+UNLIMITED = 1e9
+"""Speed of contacts that bear nothing, m/s."""
 
 
 @part
@@ -65,12 +71,12 @@ def visit(
     hit = hit if wait == 0.0 else 0.0
     left = -gap - normal * compliance
     bears = normal if gap < NEAR else 0.0
-    ahead = gap if gap > 0.0 else 0.0
-    closing = ahead if bears == 0.0 else 0.0
-    rate = open_rate if closing > 0.0 else closed_rate
-    gain = open_gain if closing > 0.0 else closed_gain
+    rate = open_rate if gap > 0.0 else closed_rate
+    gain = open_gain if gap > 0.0 else closed_gain
+    slowest = CLOSING * fastest if bears > 0.0 else UNLIMITED
     aim = left * rate
     aim = aim if aim < fastest else fastest
+    aim = aim if aim > -slowest else -slowest
     impulse = normal + (aim - separating) * gain
     impulse = impulse if impulse > 0.0 else 0.0
     impulse = -rebound * separating if hit > 0.0 else impulse
@@ -87,9 +93,10 @@ def visit(
     later = wait - 1.0
     later = later if later > 0.0 else 0.0
     later = WAIT if hit > 0.0 else later
-    # A contact that goes on bearing is moved together as well.
-    together = left if bears * impulse > 0.0 else 0.0
-    push = apart * (left if left > 0.0 else together) * act
+    push = apart * left
+    push = push if left > 0.0 else 0.0
+    push = push * act
+    ahead = gap if gap > 0.0 else 0.0
     speed = separating if hit > 0.0 else -1.0
     back = hit * ahead / speed
     return (

@@ -73,6 +73,9 @@ def script(first: Mapping[str, float]) -> Iterator[Mapping[str, float]]:
         for name in eyes:
             if chance.random() < 0.02:
                 signals[name] = 1.0 - signals[name]
+        if 2200 <= scan < 2700:  # bottles have wedged in a combiner
+            signals.update({f"photo_eyes/single_{eye}/blocked": 0.0 for eye in ("entered", "backed", "full")})
+            signals["photo_eyes/single_standing/blocked"] = 1.0
         if 5300 <= scan < 5500:  # a start of the block without a queue, while the line empties
             signals["photo_eyes/block_queued/blocked"] = 0.0
         for name in geared:
@@ -126,7 +129,8 @@ def test_the_project_is_its_twin(line: FirstScan, expected: list[Mapping[str, fl
         ("line.st", "waited > SETTLE_TIME", "waited >= SETTLE_TIME"),
         ("line.st", "powered AND (ready OR reset_button)", "powered"),
         ("line.st", "bottles > REMAINDER", "bottles >= REMAINDER"),
-        ("line.st", "SEL(label_queued, 1.0, SLOWER) * 0.055", "SEL(single_queued, 1.0, SLOWER) * 0.055"),
+        ("combiner.st", "waited > STUCK", "waited >= STUCK"),
+        ("combiner.st", "NOT full AND left = 0", "NOT full"),
         ("block.st", "queued OR empties", "queued"),
         ("reject.st", "1.5 * SCAN", "SCAN"),
         ("rates.st", "nearer := labeller.rate", "nearer := nominal"),
