@@ -14,6 +14,7 @@ SECONDS = {
     **dict.fromkeys(("buffer_lane", "two_stations"), 30.0),
     **dict.fromkeys(("reject_line", "watched_eyes", "zoned_line"), 60.0),
     "filler_block": 20.0,
+    "panel_line": 5.0,  # stands until an operator starts it
 }
 """Of those that go on as they are then."""
 BEYOND = {"buffer_lane", "two_stations"}

@@ -11,6 +11,7 @@ from conveyor_sim.simulation import Simulation
 RATE = 24000.0 / 3600.0
 """Bottles per second."""
 RADIUS, MASS, STIFFNESS, MU = 0.033, 0.5, 2e4, 0.15
+DAMPING = {"law": "normal", "restitution": 0.5}
 FIRST_PITCH, LAST_PITCH = 0.068, 0.157
 SCREW_START, SCREW_END = 1.0, 1.6
 POCKETS, PITCH_RADIUS, POCKET_RADIUS = 12, 0.3, 0.034
@@ -20,15 +21,24 @@ FAST = 1.3
 """Speed of a belt that is faster than all bottles in the screw, m/s."""
 
 _STEEL = {"material": "steel"}
+_SPARE = {
+    "spare_arc": {"kind": "arc", "centre": [20.0, 20.0], "radius": 0.1, "start_angle": 0.0, "span": 1.0},
+    "spare_segment": {"kind": "segment", "from": [20.0, 21.0], "to": [21.0, 21.0]},
+}
+"""Rails that no bottle touches."""
 
 
 def line(damped: bool = True, friction: float = MU, threads: int = 1, **fields: Any) -> Simulation:
-    """Return a line with two axes, and bottles of half a litre."""
-    damping = {"damping": {"law": "normal", "restitution": 0.5}} if damped else {}
-    contact = {"stiffness": STIFFNESS, "friction": friction, **damping}
+    """Return a line with two axes, and bottles of half a litre. damped, friction: at steel."""
+    usual = {"stiffness": STIFFNESS, "friction": MU, "damping": DAMPING}
+    contact = {"stiffness": STIFFNESS, "friction": friction, **({"damping": DAMPING} if damped else {})}
     given: dict[str, Any] = {
         "bottle_types": {"bottle": {"radius": RADIUS, "mass": MASS, "material": "pet"}},
-        "contacts": [{"between": ["pet", "pet"], **contact}, {"between": ["pet", "steel"], **contact}],
+        "contacts": [
+            {"between": ["pet", "pet"], **usual},
+            {"between": ["pet", "steel"], **contact},
+            {"between": ["pet", "brass"], **usual},
+        ],
         "base": [{"between": ["pet", "chain"], "friction": MU}],
         "axes": {"block": {"rate": RATE}, "star": {"master": "block", "ratio": 1.0 / POCKETS}},
         "accuracy": {"per_tick": 100},
@@ -60,9 +70,10 @@ def screw_line(speed: float, threads: int = 1, play: float = 1e-3, **fields: Any
 
 
 def star_line(late: float = 0.0, guided: bool = True, worn: float = 0.0, **fields: Any) -> Simulation:
-    """Return one bottle that comes to a wheel at the speed of its pockets.
+    """Return a bottle that comes to a wheel at the speed of its pockets, and one at rest far away.
 
-    late: of the wheel, in pitches. worn: by which its first pocket is larger, m.
+    late: of the wheel, in pitches. worn: by which its first pocket is larger, m. The second bottle and the spare rails
+    give all wheels the kernels of a line with guides and a queue.
     """
     before = 0.5
     star = {
@@ -84,4 +95,8 @@ def star_line(late: float = 0.0, guided: bool = True, worn: float = 0.0, **field
         stripper = {"right": sides["right"], "left": [[0.05, POCKET_RADIUS + 0.002], [0.2, POCKET_RADIUS]]}
         conveyors["discharge"]["guides"] = {**_STEEL, **stripper}
     bottle = {"type": "bottle", "position": [1.0 - before, 0.0], "velocity": [SPEED, 0.0]}
-    return line(**{"conveyors": conveyors, "stars": {"in": star}, "bottles": [bottle], **fields})
+    far = {"type": "bottle", "position": [20.0, 18.0]}
+    return line(
+        conveyors=conveyors, stars={"in": star}, bottles=[bottle, far],
+        rails={name: {**rail, "material": "brass"} for name, rail in _SPARE.items()}, **fields,
+    )  # fmt: skip

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scenes import COMMON, MASS, RADIUS, bottle, contact, scene
+from scenes import COMMON, MASS, RADIUS, bottle, contact, scene, segment
 
 from conveyor_sim.columns.ledger import Ledger
 from conveyor_sim.engine.arrays.moving import OFF_PROFILE, MovingBodies
@@ -91,10 +91,13 @@ def build(monkeypatch: pytest.MonkeyPatch) -> Build:
                 contact(STIFFNESS),
                 contact(STIFFNESS, "steel", ("normal", 20.0), friction),
                 contact(STIFFNESS, "ice", ("normal", 20.0)),
+                contact(STIFFNESS, "tin", ("normal", 20.0), 0.1),
             ],
             "bottles": [*bottles, bottle(20.0, 20.0)],
         }
-        return Simulation(scene(**{**given, **fields}), threads)
+        # A rail with friction that nothing touches: scenes with and without friction share their kernels.
+        rails = {**fields.pop("rails", {}), "spare": {**segment((30.0, 30.0), (31.0, 30.0)), "material": "tin"}}
+        return Simulation(scene(**{**given, **fields, "rails": rails}), threads)
 
     return built
 
@@ -192,7 +195,7 @@ def test_a_wheel_in_phase_exerts_the_force_of_its_turning(build: Build, integrat
 def test_a_moving_surface_drags_with_friction(build: Build, integrator: str) -> None:
     """a = 2 mu N / m from rest, up to the speed of the belts; their work is that of the friction and of the bottle."""
     friction = 0.3
-    sim = build(BELTS, bottle(1.0, 0.0), axes=(), friction=friction, integrator=integrator)
+    sim = build(BELTS, bottle(1.0, 0.0), friction=friction, integrator=integrator)
     a = 2.0 * friction * STIFFNESS * PINCH / MASS
     sim.advance(3)
     state, ledger = sim.bottles(), ledger_of(sim)
@@ -209,7 +212,7 @@ def test_a_moving_surface_drags_with_friction(build: Build, integrator: str) -> 
 def test_a_belt_goes_round_its_ends(build: Build) -> None:
     """At the end of a belt, its surface moves along the bottle too: it is no wall that hits it."""
     end = RADIUS - 1e-4
-    sim = build(BELTS[:1], bottle(3.0 + end, RADIUS - PINCH), axes=(), friction=0.0)
+    sim = build(BELTS[:1], bottle(3.0 + end, RADIUS - PINCH))
     sim.advance(1)
     assert sim.bottles().vx[0] < 0.05
     assert sim.bottles().vy[0] == pytest.approx(0.0, abs=1e-12)
@@ -264,7 +267,10 @@ def crowd(build: Build, **more: Any) -> Simulation:
         *(bottle(x, y, -OMEGA * y, OMEGA * x) for x, y in places),
         bottle(5.0 + RADIUS, 0.0), bottle(5.4, 0.02), bottle(7.5, 0.0), bottle(7.9, 0.0),
         axes=(axis(limit=1.0),), rails={"guide": {**GUIDE, "material": "steel"}},
-        contacts=[contact(STIFFNESS, damping=("normal", 20.0), friction=0.2), steel], **more,
+        contacts=[
+            contact(STIFFNESS, damping=("normal", 20.0), friction=0.2), steel,
+            contact(STIFFNESS, "tin", ("normal", 20.0)),
+        ], **more,
     )  # fmt: skip
 
 

@@ -47,6 +47,8 @@ def queue(integrator: str, solver: str, base: str = "point", **accuracy: Any) ->
     walls = {"right": ((0.0, 0.0), (end, 0.0)), "left": ((end, WIDTH), (0.0, WIDTH)),
              "stop": ((end, 0.01 * WIDTH), (end, 0.99 * WIDTH))}  # fmt: skip
     damping = {"law": "normal", "restitution": 0.5}
+    # A type without bottles, on a ring: queues on points and on rings share their kernels.
+    kind = {"radius": RADIUS, "mass": MASS, "material": "glass"}
     fields = {
         "accuracy": {"integrator": integrator, **accuracy},
         "friction_solver": solver,
@@ -55,7 +57,10 @@ def queue(integrator: str, solver: str, base: str = "point", **accuracy: Any) ->
             for other in ("glass", "steel")
         ],
         "base": [{"between": ["glass", "chain"], "friction": 0.3, **BASES[base]["base"]}],
-        "bottle_types": {"b": {"radius": RADIUS, "mass": MASS, "material": "glass", **BASES[base]["type"]}},
+        "bottle_types": {
+            "b": {**kind, **BASES[base]["type"]},
+            **({} if base == "spring" else {"absent": {**kind, **RING["type"]}}),
+        },
         "belts": {"chain": {"kind": "straight", "start": [0, 0], "angle": 0, "length": end + 0.1, "width": WIDTH,
                             "speed": 0.45, "material": "chain"}},
         "rails": {name: {"kind": "segment", "material": "steel", "from": p, "to": q} for name, (p, q) in walls.items()},

@@ -68,7 +68,7 @@ def test_carried_bottle_moves_on_the_pitch_circle() -> None:
     sim.advance(round((0.5 / SPEED + 0.3 * HALF_TURN) / sim.scene.tick))
     for _ in range(20):
         sim.advance()
-        (x,), (y,) = sim.bottles().x, sim.bottles().y
+        x, y = sim.bottles().x[0], sim.bottles().y[0]
         assert math.hypot(x - 1.0, y - PITCH_RADIUS) == pytest.approx(PITCH_RADIUS, abs=2.5 * play)
         turned = OMEGA * (sim.time - 0.5 / SPEED)
         assert math.atan2(x - 1.0, PITCH_RADIUS - y) == pytest.approx(turned, abs=2.5 * play / PITCH_RADIUS)
@@ -124,7 +124,7 @@ def test_worn_pocket_leaves_more_play() -> None:
     for worn in (0.0, 0.005):
         sim = star_line(worn=worn)
         sim.advance(round((0.5 / SPEED + 0.5 * HALF_TURN) / sim.scene.tick))
-        (x,), (y,) = sim.bottles().x, sim.bottles().y
+        x, y = sim.bottles().x[0], sim.bottles().y[0]
         angle = math.atan2(x - 1.0, PITCH_RADIUS - y)
         lags.append(PITCH_RADIUS * (OMEGA * (sim.time - 0.5 / SPEED) - angle))
     assert lags[1] > lags[0] + 0.002
@@ -156,8 +156,12 @@ def large_wheel(threads: int) -> Simulation:
     }  # fmt: skip
     return line(
         threads=threads,
-        base=[],
         floor={"friction": MU},
+        # A lane far away, so that the wheel shares the kernels of the others.
+        conveyors={
+            "spare": {"start": [20.0, 20.0], "path": [{"straight": 1.0}], "width": 0.1, "speed": SPEED,
+                      "material": "chain", "guides": {"clearance": 0.07, "material": "steel"}},
+        },
         stars={"in": wheel},
         axes={"star": {"rate": RATE / pockets, "torque_limit": 0.5 * drag, "inertia": 5.0, "following_limit": "none"}},
         bottles=[

@@ -1,14 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Springs at straight rails along a belt carry a part of a queue: a warning where loads on bottles are in question."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import CliRunner
 from facts import missing
-from scenes import NO_OUTPUTS, SHIPPED, arc, base, belt, bottle, contact, scene, segment
+from physics.state.test_checkpoint import queue
+from scenes import NO_OUTPUTS, SHIPPED, SPRINGS_AND_RINGS, arc, base, belt, bottle, contact, scene, segment
 
 from conveyor_sim.cli import main
 from conveyor_sim.physics.effects.sprung_walls import SprungWalls, sprung_walls
@@ -84,9 +84,8 @@ def test_no_shipped_scene_is_warned() -> None:
 
 def test_check_explain_and_run_show_the_warning(tmp_path: Path) -> None:
     file = tmp_path / "walls.yaml"
-    types = {"bottle": {"radius": 0.065, "mass": 0.2, "material": "glass", "base_radius": 0.05}}
-    text = {"name": "walls", "duration": 0.02, "outputs": NO_OUTPUTS, "bottle_types": types, **AT_RAILS}
-    file.write_text(json.dumps(text))
+    # Effects of the checkpoint tests, for the kernels.
+    file.write_text(queue(**SPRINGS_AND_RINGS, duration=0.02).source_text)
     drawn, bag = ["--out", str(tmp_path)], ["--out", str(tmp_path / "bag")]
     for command, *options in (["check", *drawn], ["explain"], ["run", "--no-record"], ["run", *bag]):
         result = CliRunner().invoke(main, [command, str(file), *options])
