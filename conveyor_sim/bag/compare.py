@@ -76,7 +76,7 @@ def _entries(values: Any) -> NDArray[Any]:
 
 
 def _seconds(message: Any) -> str:
-    """Return the stamp as a text. Stamps of two readers may be of different classes, so they are not compared."""
+    """Return the stamp as a text with all its digits."""
     stamp = message.header.stamp
     return f"{stamp.sec}.{stamp.nanosec:09d} s"
 

@@ -104,8 +104,6 @@ class BottlingLine:
     """Signals whose sum is the number of bottles on the line."""
     formats: Sequence[Mapping[str, float]]
     """Commands by position of the selector."""
-    started: bool = False
-    """Run from the first scan."""
     remainder: float = 23.0
     """Largest number of bottles on an empty line, fewer than a case."""
     warning: int = 100
@@ -117,10 +115,6 @@ class BottlingLine:
     _waited: int = 0
     _ready: bool = True
     _start: bool = field(default=True)
-
-    def __post_init__(self) -> None:
-        if self.started:
-            self._step = LineStep.RUNNING
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return the commands of one scan."""
@@ -171,11 +165,10 @@ class BottlingLine:
         return LineStep.EMPTYING
 
 
-def brewery(supply: float = 14.0, buffer: float = 9.0, started: bool = False) -> Controller:
+def brewery(supply: float = 14.0, buffer: float = 9.0) -> Controller:
     """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject.
 
     supply, buffer: lengths of the wide conveyors before and behind the block, m, the scene's parameters.
-    started: the line runs from the first scan, without the start button.
     """
     belts = ("supply", "spread", "filled", "leaving", "cold", "wide", "packing")
     cells = ("single", "label")
@@ -194,7 +187,6 @@ def brewery(supply: float = 14.0, buffer: float = 9.0, started: bool = False) ->
             "zones/layer/bottles",
         ),
         formats=({"machines/depalletiser/cmd_bottle": 0.0}, {"machines/depalletiser/cmd_bottle": 1.0}),
-        started=started,
     )
     reject = TrackedReject(
         belt="label_lane",
