@@ -165,7 +165,7 @@ class BottlingLine:
         return LineStep.EMPTYING
 
 
-def brewery(supply: float = 14.0, buffer: float = 9.0) -> Controller:
+def brewery(supply: float = 9.0, buffer: float = 8.0) -> Controller:
     """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject.
 
     supply, buffer: lengths of the wide conveyors before and behind the block, m, the scene's parameters.
@@ -204,7 +204,7 @@ def v_curve(supply: float, buffer: float) -> VCurve:
     """Return the rates of the machines around the filler block of `brewery.yaml`, with levels that suit the lengths."""
 
     def neighbour(machine: str, zone: str, *levels: float) -> Neighbour:
-        size = supply / 14.0 if zone == "supply" else buffer / 9.0
+        size = {"supply": supply / 9.0, "cold": 1.0}.get(zone, buffer / 8.0)
         low, target, high = (level * size for level in levels)
         return Neighbour(f"machines/{machine}/rate", Count(f"zones/{zone}/bottles"), low, target, high)
 
@@ -212,10 +212,10 @@ def v_curve(supply: float, buffer: float) -> VCurve:
         bottleneck=None,
         rate="panel/rate/value",
         margin=0.04,
-        upstream=(neighbour("depalletiser", "supply", 2200, 2600, 3000),),
+        upstream=(neighbour("depalletiser", "supply", 1400, 1650, 1900),),
         downstream=(
-            neighbour("pasteuriser", "filled", 300, 500, 700),
-            neighbour("labeller", "cold", 300, 900, 1100),
-            neighbour("packer", "packing", 300, 500, 700),
+            neighbour("pasteuriser", "filled", 270, 450, 630),
+            neighbour("labeller", "cold", 700, 850, 1000),
+            neighbour("packer", "packing", 270, 450, 630),
         ),
     )

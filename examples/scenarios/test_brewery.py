@@ -13,7 +13,7 @@ from conveyor_sim.testing.plugin import Lines
 
 FOLDER = Path(__file__).resolve().parents[1] / "brewery"
 RATE = 40_000 / 3600  # bottles per second
-AT_START = 5492
+AT_START = 5152
 
 
 def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: int) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: 
 
 SHORT = {
     "parameters": {"dwell": 2.0},
-    "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 8.2, -0.55, 10, 6)],
+    "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 7.2, -0.55, 10, 6)],
     "conveyors": {"filled": {"speed": 0.5}, "packing": {"speed": 0.5}, "cold": {"path": [{"straight": 2.0}]}},
     "machines": {
         "depalletiser": {"layer": {"rows": 6, "columns": 15, "pitch": 0.0675, "pusher": "sweep"}},

@@ -18,10 +18,10 @@ BREWERY = Path(__file__).resolve().parents[3] / "examples" / "brewery"
 SCANS = 6000
 LENGTH = 0.01  # s
 LEVELS = {
-    "zones/supply/bottles": 3200,
-    "zones/filled/bottles": 900,
-    "zones/cold/bottles": 1300,
-    "zones/packing/bottles": 900,
+    "zones/supply/bottles": 2200,
+    "zones/filled/bottles": 850,
+    "zones/cold/bottles": 1250,
+    "zones/packing/bottles": 850,
 }
 """Largest numbers of bottles in the zones of the V-curve."""
 
