@@ -21,7 +21,7 @@ from conveyor_sim.support.resources import config_dir, msg_defs_dir, scene_path
 
 ROOT = Path(__file__).parent.parent
 COLCON = Path(sys.executable).parent / "colcon"
-SHIPPED = {"accumulation_table", "paper_plant", "turntable", "two_bottles"}
+SHIPPED = {"accumulation_table", "brewery", "paper_plant", "turntable", "two_bottles"}
 
 
 def run(*command: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -215,6 +215,14 @@ def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
     share = prefix / "share" / "conveyor_sim"
     assert found.stdout.split() == [str(share / "config"), str(share / "msg_defs")], found.stderr
     assert {scene.stem for scene in (share / "config").glob("*.yaml")} >= SHIPPED
+    code = (
+        "from conveyor_sim.support.resources import scene_path; from conveyor_sim.scene import load_scene;"
+        "from conveyor_sim.control.st.load import load;"
+        "print(*(len(load_scene(scene_path(name), {'bottles': []}).machines) for name in ('brewery', 'brewery/hall')));"
+        "load('brewery/plc')"
+    )
+    loaded = run(sys.executable, "-c", code, cwd=tmp_path / "install", PYTHONPATH=str(packages))
+    assert loaded.stdout.split() == ["7", "70"], loaded.stderr
 
 
 def test_launch_file_hands_the_node_parameters_that_it_has() -> None:

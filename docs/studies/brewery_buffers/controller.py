@@ -6,9 +6,9 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Mapping
 
-from pathlib import Path
 
-from conveyor_sim.control import Controller, load
+from conveyor_sim.control import Controller
+from conveyor_sim.control.brewery import brewery
 from conveyor_sim.control.scan import Inputs
 
 
@@ -26,5 +26,4 @@ class Started:
 
 def started(supply: float = 4.0, buffer: float = 6.0) -> Controller:
     """Return the controller of the brewery with its start button pressed. supply, buffer: lengths of its conveyors, m."""
-    line = Path(__file__).parents[3] / "examples" / "brewery" / "brewery.py"
-    return Started(load(f"{line}:brewery", {"supply": supply, "buffer": buffer}))
+    return Started(brewery(supply, buffer))
