@@ -16,6 +16,9 @@ import pytest
 from facts import missing, stating
 
 import conveyor_sim
+from conveyor_sim.control.scan import ControlError
+from conveyor_sim.control.st import StructuredText
+from conveyor_sim.control.st.load import load
 from conveyor_sim.errors import SceneError
 from conveyor_sim.support.resources import config_dir, msg_defs_dir, scene_path
 
@@ -55,6 +58,15 @@ def test_a_file_where_the_user_stands_wins(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     Path("two_bottles.yaml").write_text("name: mine\n")
     assert scene_path("two_bottles.yaml") == Path("two_bottles.yaml")
+
+
+def test_a_shipped_folder_of_programs_is_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("brewery/plc", "config/brewery/plc"):
+        assert isinstance(load(name), StructuredText)
+    Path("brewery/plc").mkdir(parents=True)  # where the user stands
+    with pytest.raises(ControlError, match=stating("brewery/plc", "folder without a program")):
+        load("brewery/plc")
 
 
 @pytest.mark.parametrize("name", ["no_such_scene", "elsewhere/two_bottles.yaml"])

@@ -19,10 +19,8 @@ from conveyor_sim.scene import load_scene, parse_scene
 from conveyor_sim.support.resources import scene_path
 
 ROOT = Path(__file__).resolve().parents[2]
-CROWDED = {"brewery"}
-"""Lines of 100 m, with more parts than names have room on a page."""
 SCENES = [
-    *(path.stem for path in sorted((ROOT / "config").glob("*.yaml")) if path.stem not in CROWDED),
+    *(path.stem for path in sorted((ROOT / "config").glob("*.yaml"))),
     *(f"examples/{path.name}" for path in sorted((ROOT / "examples").glob("*.yaml"))),
 ]
 SIZES = [(1280, 720), (1920, 1080), (820, 1180), (390, 844)]
