@@ -42,6 +42,8 @@ setup(
         ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
         (f"share/{NAME}", ["package.xml"]),
         (f"share/{NAME}/config", glob("config/*.yaml")),
+        (f"share/{NAME}/config/brewery", glob("config/brewery/*.yaml")),
+        (f"share/{NAME}/config/brewery/plc", glob("config/brewery/plc/*.st")),
         (f"share/{NAME}/config/scenarios", glob("config/scenarios/*.yaml")),
         (f"share/{NAME}/examples", glob("examples/small_packaging.*")),
         (f"share/{NAME}/config/ros", glob("config/ros/*")),

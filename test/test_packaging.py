@@ -16,12 +16,15 @@ import pytest
 from facts import missing, stating
 
 import conveyor_sim
+from conveyor_sim.control.scan import ControlError
+from conveyor_sim.control.st import StructuredText
+from conveyor_sim.control.st.load import load
 from conveyor_sim.errors import SceneError
 from conveyor_sim.support.resources import config_dir, msg_defs_dir, scene_path
 
 ROOT = Path(__file__).parent.parent
 COLCON = Path(sys.executable).parent / "colcon"
-SHIPPED = {"accumulation_table", "paper_plant", "turntable", "two_bottles"}
+SHIPPED = {"accumulation_table", "brewery", "paper_plant", "turntable", "two_bottles"}
 
 
 def run(*command: object, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -55,6 +58,15 @@ def test_a_file_where_the_user_stands_wins(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.chdir(tmp_path)
     Path("two_bottles.yaml").write_text("name: mine\n")
     assert scene_path("two_bottles.yaml") == Path("two_bottles.yaml")
+
+
+def test_a_shipped_folder_of_programs_is_found_by_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("brewery/plc", "config/brewery/plc"):
+        assert isinstance(load(name), StructuredText)
+    Path("brewery/plc").mkdir(parents=True)  # where the user stands
+    with pytest.raises(ControlError, match=stating("brewery/plc", "folder without a program")):
+        load("brewery/plc")
 
 
 @pytest.mark.parametrize("name", ["no_such_scene", "elsewhere/two_bottles.yaml"])
@@ -215,6 +227,14 @@ def test_colcon_install_has_what_ros_looks_for(tmp_path: Path) -> None:
     share = prefix / "share" / "conveyor_sim"
     assert found.stdout.split() == [str(share / "config"), str(share / "msg_defs")], found.stderr
     assert {scene.stem for scene in (share / "config").glob("*.yaml")} >= SHIPPED
+    code = (
+        "from conveyor_sim.support.resources import scene_path; from conveyor_sim.scene import load_scene;"
+        "from conveyor_sim.control.st.load import load;"
+        "print(*(len(load_scene(scene_path(name), {'bottles': []}).machines) for name in ('brewery', 'brewery/hall')));"
+        "load('brewery/plc')"
+    )
+    loaded = run(sys.executable, "-c", code, cwd=tmp_path / "install", PYTHONPATH=str(packages))
+    assert loaded.stdout.split() == ["7", "70"], loaded.stderr
 
 
 def test_launch_file_hands_the_node_parameters_that_it_has() -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections import ChainMap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import Any, Protocol
 
 from conveyor_sim.control.alarm import Alarm
@@ -89,6 +90,7 @@ class Controller(Protocol):
     - `declared_alarms`: a sequence of Alarm. Alarms without a declaration have defaults.
     - `bind`: a method that receives the line's tags (`LineTags`) before the first scan.
     - `alarm_tags`: tags (`alarms/<id>`) of alarms without a declaration, available after `bind`.
+    - `signals_read`: names of the signals that it reads, available after `bind`. Others are then not in the inputs.
     - `variables`: numbers by name, available to conditions of tests.
     - `record`: patterns of the variables to record (`recorded.py`).
     - `left_over`: sentences about tags without use, available after `bind`.
@@ -122,7 +124,7 @@ def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
     if not isinstance(answer, Mapping):
         raise ControlError(f"scan: {answer!r:.200} returned, expected a mapping of commands")
     try:
-        return {name: float(value) for name, value in answer.items() if not name.startswith(ALARMS)}
+        return {name: float(answer[name]) for name in _command_names(tuple(answer))}
     except (AttributeError, OverflowError, TypeError, ValueError):
         for name, value in answer.items():
             if not isinstance(name, str):
@@ -130,6 +132,18 @@ def commands_of(answer: Mapping[str, float]) -> dict[str, float]:
                 raise ControlError(text) from None
             number(name, value)
         raise
+
+
+@lru_cache(maxsize=16)
+def _command_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names that are no alarms. Cached, because a controller repeats its names in every scan."""
+    return tuple(name for name in names if not name.startswith(ALARMS))
+
+
+@lru_cache(maxsize=16)
+def alarm_names(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names that are alarms. Cached as `_command_names`."""
+    return tuple(name for name in names if name.startswith(ALARMS))
 
 
 def number(name: str, value: object) -> float:

@@ -123,9 +123,8 @@ class ScanContext:
         if plant.one_surface_per_belt:
             return carried
         counts = [0] * self.belt_speeds.size
-        for shape, count in zip(plant.surfaces, carried, strict=True):
-            if shape.belt is not None:
-                counts[shape.belt] += count
+        for surface, belt in plant.belt_surfaces:
+            counts[belt] += carried[surface]
         return counts
 
 

@@ -22,7 +22,7 @@ from conveyor_sim.line.commands.modes import Modes
 from conveyor_sim.line.commands.operation import Operation
 from conveyor_sim.line.commands.placement import BottlePlacement
 from conveyor_sim.line.commands.read_back import ReadBack
-from conveyor_sim.line.commands.refusal import moved_belts, refusal, shown
+from conveyor_sim.line.commands.refusal import CommandLimits, moved_belts, refusal, shown
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.device_kinds import build_devices
 from conveyor_sim.line.devices.belt_surfaces import BeltSurfaces
@@ -132,6 +132,10 @@ _Outcome = tuple[int, Input, bool, str, bool, bool, bool, tuple[int, ...]]
 _REMOVED: tuple[Adds, ...] = ("removed", "rejected")
 
 
+Reader = Callable[[ScanContext], Sequence[float]]
+"""Function that reads the signals of a device, in their order."""
+
+
 class _Part(NamedTuple):
     """Part of a line whose state lasts from tick to tick, as plain data."""
 
@@ -160,6 +164,8 @@ class Line:
         self._watched = [mover for mover in movers if mover.watchdog is not None]
         self._eyes = [device for device in devices if isinstance(device, PhotoEyeDevice)]
         self._reading = [device.read for device in devices]
+        self._names_read: tuple[str, ...] = ()
+        self._devices_read: list[tuple[Reader, list[tuple[str, int]]]] = []
         # Only overridden methods are called.
         self._called = CalledDevices(devices, self._log.leave_out)
         exits = state.model.has("outfeed")
@@ -189,6 +195,7 @@ class Line:
         """Present value and writer of each command."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         self._commands = {tag.name: tag for tag in self.image.commands}
+        self._limits = CommandLimits(self._commands)
         self._panel = frozenset(tag.name for tag in self.image.commands if tag.role == PANEL)
         self._faults = {tag.name: tag for tag in self.image.faults}
         self._moved = moved_belts(self.image.tags)
@@ -281,7 +288,11 @@ class Line:
 
     def _set_refusal(self, request: Input) -> str:
         names, values = request.names, request.values
-        if reason := _with_texts(request) or refusal(self._commands, "command", names, values, self._moved):
+        if reason := _with_texts(request):
+            return reason
+        if not self._limits.admit(names, values) and (
+            reason := refusal(self._commands, "command", names, values, self._moved)
+        ):
             return reason
         if self._panel and (reason := panel_problem(request, self._panel)):
             return reason
@@ -403,6 +414,34 @@ class Line:
         self.now.begin_scan()
         values = [value for read in self._reading for value in read(self.now)]
         return self.forcing.image(np.array(values + self.modes.values, dtype=np.float64))
+
+    def values_of(self, names: tuple[str, ...]) -> dict[str, float]:
+        """Return the values of some signals as controllers read them. Other devices are not read.
+
+        Raises KeyError for a name that is no signal.
+        """
+        if names != self._names_read:
+            self._names_read, self._devices_read = names, self._readers_of(names)
+        self.now.begin_scan()
+        values: dict[str, float] = {}
+        for read, columns in self._devices_read:
+            row = read(self.now)
+            for name, column in columns:
+                values[name] = float(row[column])
+        for name, value, _ in self.forcing.forces:
+            if name in values:
+                values[name] = value
+        return values
+
+    def _readers_of(self, names: Sequence[str]) -> list[tuple[Reader, list[tuple[str, int]]]]:
+        """Return the functions that read the devices of some signals, with these signals and their places."""
+        sources: list[Device | Modes] = [*self._devices, self.modes]
+        places = {tag.name: (source, place) for source in sources for place, tag in enumerate(source.signals)}
+        columns: dict[Device | Modes, list[tuple[str, int]]] = {}
+        for name in names:
+            source, place = places[name]
+            columns.setdefault(source, []).append((name, place))
+        return [(source.read, chosen) for source, chosen in columns.items()]
 
     def counters(self) -> CounterColumns | None:
         """Return production counts and times since the last reset; None if no device counts."""

@@ -78,6 +78,11 @@ class Plant:
         return np.array([*belts, -1], dtype=np.int32)
 
     @cached_property
+    def belt_surfaces(self) -> tuple[tuple[int, int], ...]:
+        """Index of each surface that belongs to a belt, and that of the belt."""
+        return tuple((index, shape.belt) for index, shape in enumerate(self.surfaces) if shape.belt is not None)
+
+    @cached_property
     def one_surface_per_belt(self) -> bool:
         """True if the index of a surface is that of its belt: no belt has several surfaces, and there is no plate."""
         return len(self.surfaces) == len(self.scene.belts)

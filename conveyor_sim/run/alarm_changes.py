@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from conveyor_sim.control.scan import ALARMS, ON, commands_of, number
+from conveyor_sim.control.scan import ON, alarm_names, commands_of, number
 
 
 class AlarmChanges:
@@ -20,7 +20,10 @@ class AlarmChanges:
 
         Raises ControlError for a value that is no number.
         """
-        alarms = {name: float(number(name, value) >= ON) for name, value in answer.items() if name.startswith(ALARMS)}
+        names = alarm_names(tuple(answer))
+        if not (names or self._raised):
+            return {}
+        alarms = {name: float(number(name, answer[name]) >= ON) for name in names}
         now = {**dict.fromkeys(self._raised, 0.0), **alarms}
         changes = {name: value for name, value in now.items() if self._raised.get(name) != value}
         self._raised = now

@@ -42,6 +42,8 @@ class AttachedController(Protocol):
     """Name of the writer of its commands."""
     controller: Controller | None = None
     """Controller object of this process, whose memory is stored in checkpoints; None if there is no such object."""
+    signals_read: tuple[str, ...] | None = None
+    """Names of the signals that it reads; None: all of them may be read."""
     recorded: RecordedVariables = RecordedVariables(None)
     """Variables that are recorded, and that test conditions can read."""
 
@@ -81,6 +83,7 @@ class LocalController(AttachedController):
         declared = declared_alarms(controller)
         self.writer = type(controller).__name__
         self.controller = controller
+        self.signals_read = getattr(controller, "signals_read", None)
         self.recorded = RecordedVariables(controller, record)
         if declared:
             ids, texts = tuple(alarm.id for alarm in declared), tuple(alarm.as_text() for alarm in declared)
@@ -187,7 +190,11 @@ class ScanLoop:
         if self._attached is None or self._scanned == simulation.tick:
             return
         self._scanned = simulation.tick
-        signals = dict(zip(simulation.process_image.signal_names, simulation.signals().tolist(), strict=True))
+        reads = self._attached.signals_read
+        if reads is None:
+            signals = dict(zip(simulation.process_image.signal_names, simulation.signals().tolist(), strict=True))
+        else:
+            signals = simulation.values_of(reads)
         try:
             self.scan(Inputs(signals, simulation.time, simulation.tick, simulation.scene.tick))
         except ControlError as error:

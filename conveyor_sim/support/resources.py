@@ -42,6 +42,13 @@ def msg_defs_dir() -> Path:
     return share_dir() / "msg_defs"
 
 
+def in_config(path: Path) -> Path | None:
+    """Return a path relative to config/, with or without `config/` at its start. None if it leads out of there."""
+    if path.is_absolute() or ".." in path.parts:
+        return None
+    return config_dir().joinpath(*(path.parts[1:] if path.parts[:1] == ("config",) else path.parts))
+
+
 def scene_path(name_or_path: str | Path) -> Path:
     """Return the scene file of a path, or of the name of a shipped scene ("paper_plant", "scenarios/zoned_line").
 
@@ -55,9 +62,8 @@ def scene_path(name_or_path: str | Path) -> Path:
     # What is no regular file is refused where it is read, and says why.
     if os.path.exists(path) and not os.path.isdir(path):
         return path
-    parts = path.with_suffix(".yaml").parts if path.name else path.parts
-    shipped = config_dir().joinpath(*(parts[1:] if parts[:1] == ("config",) else parts))
-    if not path.is_absolute() and ".." not in parts and os.path.isfile(shipped):
+    shipped = in_config(path.with_suffix(".yaml") if path.name else path)
+    if shipped is not None and os.path.isfile(shipped):
         return shipped
     scenes = [*config_dir().glob("*.yaml"), *config_dir().glob("scenarios/*.yaml")]
     names = ", ".join(sorted(scene.relative_to(config_dir()).with_suffix("").as_posix() for scene in scenes))

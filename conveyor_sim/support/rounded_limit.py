@@ -20,9 +20,13 @@ def at_limit(value: float, low: float, high: float, rounded: Callable[[float], f
 
     value, low, high: in the same unit. rounded: returns the number that the sender's type or scale has for a limit.
     """
-    if value in (low, high) or not math.isfinite(value):
-        return value
-    for limit in (low, high):
-        if math.isfinite(limit) and rounded(limit) == value:
-            return limit
-    return value
+    return limits_by_rounding(low, high, rounded).get(value, value)
+
+
+def limits_by_rounding(low: float, high: float, rounded: Callable[[float], float] = single) -> dict[float, float]:
+    """Return the limits that differ from the numbers that the sender's type has for them, by these numbers.
+
+    low, high, rounded: as for `at_limit`.
+    """
+    numbers = {rounded(limit): limit for limit in (high, low) if math.isfinite(limit)}
+    return {number: limit for number, limit in numbers.items() if number not in (low, high) and math.isfinite(number)}

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Processor time and wall time of examples/brewery, with its controller and a recording.
+"""Processor time and wall time of config/brewery.yaml, with its controller and a recording.
 
 taskset -c 0 python docs/studies/brewery_speed.py [SECONDS]      # one line
 python docs/studies/brewery_speed.py [SECONDS] hall              # ten lines, as many threads as it takes by itself
@@ -19,16 +19,17 @@ from pathlib import Path
 from conveyor_sim.control.load import load
 from conveyor_sim.testing import Scenario
 
-EXAMPLE = Path(__file__).parents[2] / "examples" / "brewery"
+SCENES = {"brewery": "brewery", "hall": "brewery/hall"}
+"""Names of the scenes, by name of the controller."""
 PIECE = {"brewery": 20.0, "hall": 2.0}
 """Line time between two lines of output, s."""
 
 
-def measure(scene: str, seconds: float, bag: Path) -> None:
-    """Start the lines of a scene, run them for `seconds`, and print a line for each PIECE."""
-    piece = PIECE[scene]
-    with Scenario(EXAMPLE / f"{scene}.yaml", bag=bag, history=piece) as line:
-        line.attach(load(f"{EXAMPLE / f'{scene}.py'}:{scene}"))
+def measure(name: str, seconds: float, bag: Path) -> None:
+    """Start the lines of a scene of SCENES, run them for `seconds`, and print a line for each PIECE."""
+    piece = PIECE[name]
+    with Scenario(SCENES[name], bag=bag, history=piece) as line:
+        line.attach(load(f"conveyor_sim.control.brewery:{name}"))
         starts = [name for name, part in line.scene.panel.items() if name.endswith("start") and part.kind == "button"]
         line.run_for(0.5)
         for start in starts:

@@ -13,8 +13,8 @@ from pathlib import Path
 from part_pictures import draw_state, save_image
 from PIL import Image
 
+from conveyor_sim.control.brewery import brewery
 from conveyor_sim.control.filler_block import filler_block
-from conveyor_sim.control.load import load
 from conveyor_sim.control.scan import Controller
 from conveyor_sim.report.figures.draw import plot_scene
 from conveyor_sim.run.scan_loop import ScanLoop
@@ -32,7 +32,6 @@ RUNNING = 25.0
 """Simulated time of the picture of the filler block, s."""
 PRODUCING = 60.0
 """Simulated time of the picture of the brewery, s."""
-BREWERY = DOCS.parent / "examples" / "brewery"
 
 
 def example(folder: Path) -> Scene:
@@ -63,8 +62,7 @@ def main() -> None:
         print(draw_state(simulation, DOCS / "images" / "layout.webp"))
         filling = started(load_scene(scene_path("filler_block")), filler_block(), RUNNING)
         print(draw_state(filling, DOCS / "images" / "filler_block.webp"))
-        brewery = load(f"{BREWERY / 'brewery.py'}:brewery")
-        producing = started(load_scene(BREWERY / "brewery.yaml"), brewery, PRODUCING)
+        producing = started(load_scene(scene_path("brewery")), brewery(), PRODUCING)
         print(draw_state(producing, DOCS / "images" / "brewery.webp"))
         for page, scene in CHECKED.items():
             drawn = plot_scene(load_scene(scene_path(scene)), Path(folder) / page)

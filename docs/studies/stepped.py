@@ -27,9 +27,9 @@ LINE_TIME = 60.0
 """Simulated time of a run, s."""
 
 SCENES = sorted([*ROOT.glob("config/*.yaml"), *ROOT.glob("config/scenarios/*.yaml"), *ROOT.glob("examples/*.yaml")])
-SCENES += [ROOT / "examples/brewery/brewery.yaml", ROOT / "examples/pasteuriser/pasteuriser_line.yaml"]
+SCENES.append(ROOT / "examples/pasteuriser/pasteuriser_line.yaml")
 CONTROLLERS = {
-    "brewery": "examples/brewery/brewery.py:brewery",
+    "brewery": "conveyor_sim/control/brewery.py:brewery",
     "pasteuriser_line": "examples/pasteuriser/pasteuriser_line.py:controller",
     "small_packaging": "examples/small_packaging.py:controller",
 }

@@ -4,16 +4,16 @@
 Run it by hand: `pytest examples/scenarios/test_brewery.py`.
 """
 
-from pathlib import Path
 from typing import Any
 
-from conveyor_sim.control.load import load
+from conveyor_sim.control.brewery import brewery, hall
 from conveyor_sim.control.st import StructuredText
+from conveyor_sim.support.resources import config_dir
 from conveyor_sim.testing.plugin import Lines
 
-FOLDER = Path(__file__).resolve().parents[1] / "brewery"
+PROJECT = config_dir() / "brewery" / "plc"
 RATE = 40_000 / 3600  # bottles per second
-AT_START = 5492
+AT_START = 5152
 
 
 def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: int) -> dict[str, Any]:
@@ -24,7 +24,7 @@ def few(type: str, conveyor: str, at: float, offset: float, rows: int, columns: 
 
 SHORT = {
     "parameters": {"dwell": 2.0},
-    "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 8.2, -0.55, 10, 6)],
+    "bottles": [few("empty", "single_lane", 0.1, 0.0, 1, 24), few("full", "packing", 7.2, -0.55, 10, 6)],
     "conveyors": {"filled": {"speed": 0.5}, "packing": {"speed": 0.5}, "cold": {"path": [{"straight": 2.0}]}},
     "machines": {
         "depalletiser": {"layer": {"rows": 6, "columns": 15, "pitch": 0.0675, "pusher": "sweep"}},
@@ -36,8 +36,8 @@ SHORT = {
 
 
 def test_the_line_starts_and_fills(line: Lines) -> None:
-    plant = line(FOLDER / "brewery.yaml")
-    plant.attach(load(f"{FOLDER / 'brewery.py'}:brewery"))
+    plant = line("brewery")
+    plant.attach(brewery())
     plant.run_for(0.5)
     assert plant.signals["belts/supply/speed"] == plant.signals["axes/block_master/speed"] == 0.0
     plant.panel.press("start")
@@ -59,8 +59,8 @@ def test_the_line_starts_and_fills(line: Lines) -> None:
 
 
 def test_the_line_is_empty_before_the_next_bottle_comes(line: Lines) -> None:
-    plant = line(FOLDER / "brewery.yaml", SHORT)
-    plant.attach(StructuredText(FOLDER / "plc"))
+    plant = line("brewery", SHORT)
+    plant.attach(StructuredText(PROJECT))
     empty, light, full = range(3)
 
     def types() -> set[int]:
@@ -88,8 +88,8 @@ def test_the_failure_of_the_depalletiser_explains_the_low_supply(line: Lines) ->
     early = {
         "machines": {"depalletiser": {"failures": {"pallet": {"between": {"mean": 0.5}, "repair": {"mean": 2.0}}}}}
     }
-    plant = line(FOLDER / "brewery.yaml", {**SHORT, **early}, variant="failures")
-    plant.attach(StructuredText(FOLDER / "plc"))
+    plant = line("brewery", {**SHORT, **early}, variant="failures")
+    plant.attach(StructuredText(PROJECT))
     plant.run_for(2.5)
     assert plant.alarms == {"supply_low"}
     plant.panel.press("start")
@@ -101,15 +101,15 @@ def test_the_failure_of_the_depalletiser_explains_the_low_supply(line: Lines) ->
 
 
 def test_every_line_of_a_hall_has_its_controller(line: Lines) -> None:
-    hall = line(FOLDER / "hall.yaml", {"bottles": []})
-    hall.attach(load(f"{FOLDER / 'hall.py'}:hall"))
-    hall.run_for(0.1)
-    hall.panel.press("line_3_start")
-    hall.run_for(1.7)
-    running = [hall.signals[f"belts/line_{number}_filled/running"] for number in range(10)]
+    plant = line("brewery/hall", {"bottles": []})
+    plant.attach(hall())
+    plant.run_for(0.1)
+    plant.panel.press("line_3_start")
+    plant.run_for(1.7)
+    running = [plant.signals[f"belts/line_{number}_filled/running"] for number in range(10)]
     assert running == [float(number == 3) for number in range(10)]
-    hall.panel.press("line_4_estop")
-    hall.run_for(0.1)
-    assert hall.signals["belts/line_3_filled/running"] == 1.0
-    hall.panel.press("line_3_estop")
-    hall.eventually(lambda s: s["belts/line_3_filled/speed"] == 0.0, within=1.0)
+    plant.panel.press("line_4_estop")
+    plant.run_for(0.1)
+    assert plant.signals["belts/line_3_filled/running"] == 1.0
+    plant.panel.press("line_3_estop")
+    plant.eventually(lambda s: s["belts/line_3_filled/speed"] == 0.0, within=1.0)

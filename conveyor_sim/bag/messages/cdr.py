@@ -65,9 +65,7 @@ class CdrWriter:
 
     def strings(self, texts: Sequence[str]) -> None:
         """Append a sequence of strings."""
-        self._append(4, _COUNT.pack(len(texts)), 4)
-        for text in texts:
-            self.string(text)
+        self.raw(_strings(tuple(texts), self.phase))
 
     def stamp(self, stamp_ns: int) -> None:
         """Append a builtin_interfaces/Time; time in ns."""
@@ -103,6 +101,16 @@ class CdrWriter:
     def finish(self) -> bytes:
         """Return the complete message."""
         return b"".join([HEADER, *self._parts])
+
+
+@lru_cache(maxsize=64)
+def _strings(texts: tuple[str, ...], phase: int) -> bytes:
+    """Return a sequence of strings that begins at a phase. Cached, because names repeat in every message of a topic."""
+    writer = CdrWriter(phase)
+    writer.pack("I", len(texts))
+    for text in texts:
+        writer.string(text)
+    return writer.part()
 
 
 class Packer:

@@ -14,12 +14,18 @@ from conveyor_sim.control.scan import ALARMS, PROGRAM, ControlError, Inputs, Lin
 from conveyor_sim.control.st.compile import compile_files
 from conveyor_sim.control.st.errors import StructuredTextError
 from conveyor_sim.control.st.mapping import Addresses, TagMapping, mapped, read_addresses
-from conveyor_sim.control.st.program import BUDGET, MOST_VARIABLES, Program, python_value
+from conveyor_sim.control.st.program import BUDGET, MOST_VARIABLES, Program, converter, python_value
 from conveyor_sim.control.st.types import TIME, Type
 from conveyor_sim.control.st.variables import Variable, load
-from conveyor_sim.support.rounded_limit import at_limit, single
+from conveyor_sim.support.rounded_limit import limits_by_rounding, single
 
 _NS = 1e9
+
+_Input = tuple[str, Callable[[float], Any], Callable[[Any], None]]
+"""Tag of an input, its conversion to the type of the variable, and the function that writes the variable."""
+_Output = tuple[str, Callable[[], float], dict[float, float]]
+"""Tag of an output, the function that reads its variable as a number, and `_limits_of` it."""
+
 MOST_WARNINGS = 20
 """Largest number of listed warnings of the compiler."""
 
@@ -58,8 +64,8 @@ class StructuredText:
         """Patterns of the variables to record."""
         self.mapping: TagMapping | None = None
         """Variables and tags; set by `bind`, before the first scan."""
-        self._ins: list[tuple[Variable, str]] = []
-        self._outs: list[tuple[Variable, str]] = []
+        self._ins: list[_Input] = []
+        self._outs: list[_Output] = []
         self._limits: Mapping[str, tuple[float, float]] = {}
         self._forced: dict[str, Any] = {}
         self._checked = False
@@ -79,13 +85,20 @@ class StructuredText:
                 found = f"found a tag for {one.variable}, which is not among the first {MOST_VARIABLES} variables"
                 raise StructuredTextError(f"{self.program.compiled.file}: {found}, expected fewer variables before it")
         pairs = [(one.is_input, variables[one.variable], one.tag) for one in self.mapping.bound]
-        self._ins = [(variable, tag) for is_input, variable, tag in pairs if is_input]
-        self._outs = [(variable, tag) for is_input, variable, tag in pairs if not is_input]
+        self._ins = [(tag, converter(variable.type), variable.writer) for is_input, variable, tag in pairs if is_input]
+        self._outs = [
+            (tag, variable.reader, self._limits_of(variable, tag)) for is_input, variable, tag in pairs if not is_input
+        ]
 
     @property
     def alarm_tags(self) -> tuple[str, ...]:
         """Tags of outputs that are alarms, available after `bind`."""
-        return tuple(dict.fromkeys(tag for _, tag in self._outs if tag.startswith(ALARMS)))
+        return tuple(dict.fromkeys(tag for tag, *_ in self._outs if tag.startswith(ALARMS)))
+
+    @property
+    def signals_read(self) -> tuple[str, ...]:
+        """Tags of inputs, available after `bind`."""
+        return tuple(dict.fromkeys(tag for tag, *_ in self._ins))
 
     @property
     def left_over(self) -> tuple[str, ...]:
@@ -111,23 +124,22 @@ class StructuredText:
             )
         if not self._checked:
             self._check(round(inputs.length * _NS))
-        for variable, tag in self._ins:
+        for tag, convert, write in self._ins:
             value = inputs[tag]
             try:
-                variable.write(python_value(variable.type, value))
+                write(convert(value))
             except (StructuredTextError, ValueError, OverflowError) as error:
                 raise StructuredTextError(f"{self.program.compiled.file}: {tag}: {error}") from None
         self._force()
         self.program.run(round(inputs.time * _NS))
         self._force()
-        return {tag: self._output(variable, tag) for variable, tag in self._outs}
+        return {tag: limits.get(value := read(), value) for tag, read, limits in self._outs}
 
-    def _output(self, variable: Variable, tag: str) -> float:
-        """Return the value of an output. A limit rounded to the variable's type counts as the limit itself."""
-        value = variable.number()
+    def _limits_of(self, variable: Variable, tag: str) -> dict[float, float]:
+        """Return the limits of an output by their values rounded to its type, which count as the limits themselves."""
         if tag not in self._limits or (rounded := _rounding(variable.type)) is None:
-            return value
-        return at_limit(value, *self._limits[tag], rounded)
+            return {}
+        return limits_by_rounding(*self._limits[tag], rounded)
 
     def _check(self, length: int) -> None:
         """Require that intervals of tasks are whole numbers of scans.

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,6 +12,7 @@ from conveyor_sim.control import load as python
 from conveyor_sim.control.scan import ControlError, Controller
 from conveyor_sim.control.st.dialect import DIALECTS, SUFFIXES
 from conveyor_sim.control.st.foreign import FILES
+from conveyor_sim.support.resources import in_config
 
 LIBRARY = ".so"
 
@@ -24,10 +26,12 @@ _DIALECT = f"dialect ({', '.join(DIALECTS)})"
 def load(reference: str, parameters: Mapping[str, object] | None = None) -> Controller:
     """Return the controller of `program.st`, of a folder of such files, of `library.so`, or of a reference in Python.
 
-    A reference in Python is as `conveyor_sim.control.load` takes it. parameters: of the factory; for a
-    program, those of `StructuredText` and `CompiledProgram` by name. Raise ControlError, and MapError for a wrong map.
+    A folder may be one that ships with conveyor_sim ("brewery/plc"). A reference in Python is as
+    `conveyor_sim.control.load` takes it. parameters: of the factory; for a program, those of `StructuredText` and
+    `CompiledProgram` by name. Raise ControlError, and MapError for a wrong map.
     """
     given = dict(parameters or {})
+    reference = _shipped(reference)
     if reference.lower().endswith(LIBRARY):
         return _compiled(reference, given)
     if not _is_program(reference):
@@ -42,6 +46,14 @@ def load(reference: str, parameters: Mapping[str, object] | None = None) -> Cont
         {"tags": _TAGS, "modbus_map": _MAP, "record": _RECORD, "budget": _BUDGET, "dialect": _DIALECT, "files": _FILES},
     )
     return StructuredText(reference, **given)  # type: ignore[arg-type]
+
+
+def _shipped(reference: str) -> str:
+    """Return the path of a shipped folder of programs; the reference itself if it names another one, or none."""
+    if ":" in reference or os.path.exists(reference):
+        return reference
+    folder = in_config(Path(reference))
+    return str(folder) if folder is not None and os.path.isdir(folder) and any(folder.glob("*.st")) else reference
 
 
 def _is_program(reference: str) -> bool:

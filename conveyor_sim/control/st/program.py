@@ -194,12 +194,23 @@ class Program:
 
 def python_value(kind: Type, number: float) -> Any:
     """Return a signal's value for a variable. Raise StructuredTextError if the type can't hold it."""
+    return converter(kind)(number)
+
+
+def converter(kind: Type) -> Callable[[float], Any]:
+    """Return a function that converts a signal's value for variables of a type. It raises as `python_value`."""
     base = kind.base
     if base.kind == "bool":
-        return number >= 0.5
+        return lambda number: number >= 0.5
     if base.kind == "real":
-        return NAMESPACE["_single"](number) if base.name == "REAL" else float(number)
-    whole = round(number * 1e9) if base.kind in ("time", "date") else round(number)
-    if not kind.low <= whole <= kind.high:
-        raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
+        single: Callable[[float], float] = NAMESPACE["_single"]
+        return single if base.name == "REAL" else float
+    scale = 1e9 if base.kind in ("time", "date") else 1
+
+    def whole(number: float) -> int:
+        nearest = round(number * scale)
+        if not kind.low <= nearest <= kind.high:
+            raise StructuredTextError(f"found {number:g}, expected {kind.name}, {kind.low} to {kind.high}")
+        return nearest
+
     return whole

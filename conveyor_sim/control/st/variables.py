@@ -3,8 +3,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from conveyor_sim.control.st.errors import StructuredTextError
@@ -52,6 +53,21 @@ class Variable:
         if self.type.base.kind in ("time", "date"):
             return float(value) * 1e-9
         return float(len(value)) if isinstance(value, str) else float(value)
+
+    @property
+    def reader(self) -> Callable[[], float]:
+        """Function that returns `number`, in less time."""
+        if self._path or isinstance(self._last, int) or self.type.base.kind not in ("bool", "int", "real"):
+            return self.number
+        get = partial(getattr, self._owner, self._last)
+        return lambda: float(get())
+
+    @property
+    def writer(self) -> Callable[[Any], None]:
+        """Function that writes a value as `write` does, in less time."""
+        if self._path or isinstance(self._last, int):
+            return self.write
+        return partial(setattr, self._owner, self._last)
 
 
 def _at(owner: Any, path: tuple[Step, ...]) -> Any:

@@ -8,6 +8,7 @@ preceding inputs. Watchdogs act after all inputs, devices after the watchdogs.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal, NamedTuple, get_args
 
 from conveyor_sim.errors import CommandError
@@ -149,14 +150,19 @@ def normalized(request: Input) -> Input:
 def _normalized(request: Input) -> Input:
     source, writer, kind, operation, names, values, texts = request
     # Names of commands and faults stay, because unknown ones are refused. Writers choose the names of alarms.
-    alarms = operation not in (SET, INJECT)
-    normal = tuple([printable(name) if alarms or name.startswith(PREFIX) else name for name in names])
+    normal = _normal_names(tuple(names), operation not in (SET, INJECT))
     numbers = tuple([float(value) for value in values])
     if texts:
         texts = tuple(as_sent(text) if operation == DECLARE else printable(text, SENTENCE) for text in texts)
     source = printable(source)
     writer = source if writer == source else printable(writer)
     return Input(source, writer, printable(kind), printable(operation), normal, numbers, texts)
+
+
+@lru_cache(maxsize=16)
+def _normal_names(names: tuple[str, ...], foreign: bool) -> tuple[str, ...]:
+    """Return names with those of alarms escaped, or all of them. Cached, because a controller repeats its names."""
+    return tuple(printable(name) if foreign or name.startswith(PREFIX) else name for name in names)
 
 
 def _of_wrong_type(request: Input) -> str | None:

@@ -71,6 +71,43 @@ def refusal(
     return ""
 
 
+class CommandLimits:
+    """Fast check of commands. It accepts fewer of them than `refusal`, which has the reasons."""
+
+    def __init__(self, known: Mapping[str, Tag]) -> None:
+        """known: as for `refusal`."""
+        self._known = known
+        self._names: tuple[str, ...] = ()
+        self._limits: list[tuple[bool, float, float]] | None = None
+
+    def admit(self, names: tuple[str, ...], values: Sequence[float]) -> bool:
+        """Return True if `refusal` is certain to return "" for a set of commands."""
+        if names != self._names:
+            self._names, self._limits = names, self._of(names)
+        if self._limits is None or len(values) != len(names):
+            return False
+        for (whole, low, high), value in zip(self._limits, values, strict=True):
+            if not low <= value <= high or (whole and value % 1.0):
+                return False
+        return True
+
+    def _of(self, names: tuple[str, ...]) -> list[tuple[bool, float, float]] | None:
+        """Return for each command whether it is a whole number, and its finite limits; None if one has no such limits.
+
+        A controller repeats its names in every scan.
+        """
+        tags = [self._known.get(name) for name in names]
+        if not names or len(set(names)) < len(names):
+            return None
+        limits = []
+        for tag in tags:
+            if tag is None or not math.isfinite(tag.high - tag.low):
+                return None
+            low, high = (0.0, 1.0) if tag.kind == "bool" else (tag.low, tag.high)
+            limits.append((tag.kind != "number", low, high))
+        return limits
+
+
 def alarm_problem(name: str, value: float) -> str:
     """Return why a controller can't set or clear an alarm, "" if it can."""
     if name == ALARMS:

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """`BeltSurfaces`: velocity fields of the surfaces, set from the speeds of the belts. Plates rest."""
 
+from typing import Any
+
 import numpy as np
 
 from conveyor_sim.engine.arrays.types import F8
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.support.footing import refresh_footing
 from conveyor_sim.engine.support.vibration import hold_velocities
 from conveyor_sim.physics.state import State
@@ -28,6 +31,7 @@ class BeltSurfaces:
         self._outermost = np.array([shape.outermost for *_, shape in moved])
         vibrates = state.world.vibration is not None
         self._swing = np.array([shape.outermost_swing if vibrates else 0.0 for *_, shape in moved])
+        self._refresh: Any = None
         self.fastest = 0.0
         """Speed of the fastest point of any surface, m/s."""
 
@@ -53,4 +57,6 @@ class BeltSurfaces:
                 surface.ux[index], surface.uy[index] = turn * shape.centre[1], -turn * shape.centre[0]
         if world.vibration is not None:
             hold_velocities(world.vibration, surface)
-        refresh_footing(world.bottles, world.belts, surface, world.footing, world.ring)
+        arguments = world.bottles, world.belts, surface, world.footing, world.ring
+        self._refresh = self._refresh or entry(refresh_footing, *arguments)
+        self._refresh(*arguments)

@@ -136,4 +136,5 @@ class CarouselDevice(BottleWork, Device):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the values in the order of the signals."""
-        return self.processed, *self.work_values(), sum(bottle >= 0 for bottle in self.bottles)
+        held = self._pockets - self.bottles.count(NONE) - self.bottles.count(IDLE)
+        return self.processed, *self.work_values(), held

@@ -172,9 +172,8 @@ class DriveDevice(SetpointDevice):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the speed and the bottles of a belt, then running, at_speed, fault, and pulses."""
-        tripped = self.tripped
         at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
-        values = [*super().values(now), self._runs, at_speed, tripped]
+        values = [*super().values(now), self._runs, at_speed, self.tripped]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
@@ -191,7 +190,7 @@ class DriveDevice(SetpointDevice):
         """Return the commanded speed, m/s; 0 while stopped, tripped or without power."""
         if not self._runs:
             return 0.0
-        setpoint = float(now.setpoints[self._index])
+        setpoint = now.setpoints.item(self._index)
         return -setpoint if self.reverse else setpoint
 
 

@@ -76,12 +76,16 @@ class Mover(Device):
         """Move to the other end, jam, or become free, from the present position."""
         if name == self.faults[0].name:
             self.jammed = value != 0.0
+        elif self._stands and self.target == self.target_of(value):
+            self.since = now.tick  # as `plan`, which would wake it in every tick of a repeated command
+            return
         else:
             self.target = self.target_of(value)
         self.plan(now)
 
     def plan(self, now: ScanContext) -> None:
         """Start the motion profile from the present position and speed to the target, or rest if jammed."""
+        self._stands = False
         self.wake()
         self.since = now.tick
         if self.jammed:
@@ -96,8 +100,19 @@ class Mover(Device):
         """Index of its axis."""
         return self._number
 
+    _stands = False
+    """True if it rests since the end of the last tick."""
+
+    def restored(self, tick: int) -> None:
+        """Wait for the end of a tick before it rests."""
+        self._stands = False
+
     def rests(self, now: ScanContext) -> bool:
         """Return True if it stands at its target, and no bottle is near that its drive could be too weak for."""
+        self._stands = self._may_rest(now)
+        return self._stands
+
+    def _may_rest(self, now: ScanContext) -> bool:
         rails, number = self._rails(now), self._number
         if self.jammed or self.limited or self.blocked or self.position != self.target or self.speed != 0.0:
             return False

@@ -130,13 +130,13 @@ class SetpointDevice(SpeedDevice):
 
     def take_setpoint(self, value: float, now: ScanContext) -> None:
         """Set the setpoint, m/s."""
-        if now.setpoints[self._index] != value:
+        if now.setpoints.item(self._index) != value:
             self.wake()
             now.setpoints[self._index] = value
 
     def rests(self, now: ScanContext) -> bool:
         """Return True if it has the speed of the setpoint."""
-        return bool(now.speeds[self._index] == now.setpoints[self._index]) and not self.is_locked
+        return now.speeds.item(self._index) == now.setpoints.item(self._index) and not self.is_locked
 
     def take_mode(self, mode: int, now: ScanContext) -> None:
         """Suspend the watchdog outside automatic mode."""
@@ -164,5 +164,5 @@ class SetpointDevice(SpeedDevice):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the speed, m/s, and the number of bottles on a belt."""
-        index = self._index
-        return (now.speeds[index], now.carried(index)) if self._carries else (now.speeds[index],)
+        speed = now.speeds.item(self._index)
+        return (speed, now.carried(self._index)) if self._carries else (speed,)

@@ -205,6 +205,8 @@ class MachineDevice(Device):
             self.stop = value != 0.0
             self._note_failures()
         elif what == "run":
+            if self.run is (value != 0.0):
+                return  # a repeated command changes nothing
             self._switch(value != 0.0, now.by_hand)
         elif value != self.cntrl_cmd:
             self.cntrl_cmd = int(value)

@@ -12,6 +12,8 @@ from conveyor_sim.engine.arrays.contacts import PairSprings
 from conveyor_sim.engine.arrays.damage import lasting_columns, slot_columns
 from conveyor_sim.engine.arrays.impulses import CONTACTS, ROW, NearImpulses, PairImpulses
 from conveyor_sim.engine.arrays.lists import Near, NearSprings
+from conveyor_sim.engine.arrays.world import World
+from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
 from conveyor_sim.engine.impulses.carry import drop_near_impulses, drop_pair_impulses
 from conveyor_sim.engine.lists.near import drop_near_springs
 from conveyor_sim.engine.lists.neighbours import drop_springs, fill_column
@@ -41,6 +43,9 @@ class State:
         self._removed: list[int] = []
         self.held: dict[int, Held] = {}
         """Bottles held by machines, by id. They are not on the line."""
+        # Machine code of `rebuild` and `fill_column`: the types of their arguments never change in a State.
+        self._rebuild_entry: Any = None
+        self._fill: Any = None
         self.moves = 0
         """Number of changes of positions: by ticks, by bottles that were added, and by edits."""
 
@@ -288,11 +293,17 @@ class State:
     def make_lists(self) -> None:
         """Rebuild the neighbour lists if they are stale, and lengthen those that are too short."""
         while self.world.neighbourhood.stale[0]:
-            needed = rebuild(lists_of(self.world))
+            needed = self._rebuild(lists_of(self.world))
             if self.world.neighbourhood.stale[0]:
                 self._lengthen_lists(*needed)
             else:
                 self._fill_laws()
+
+    def _rebuild(self, lists: World) -> tuple[int, int, int, int, int, int]:
+        """Call `rebuild`."""
+        self._rebuild_entry = self._rebuild_entry or entry(rebuild, lists)
+        needed: tuple[int, int, int, int, int, int] = self._rebuild_entry(lists)
+        return needed
 
     def _fill_laws(self) -> None:
         """Fill the coefficients by pair, column by column, so that combinations of laws need no compilation."""
@@ -300,7 +311,9 @@ class State:
         if pairs is not None and tables is not None:
             for column, table in zip(pairs.law, tables, strict=True):
                 if column is not None:
-                    fill_column(column, table, pairs.i, pairs.j, pairs.used, self.world.bottles.type)
+                    arguments = column, table, pairs.i, pairs.j, pairs.used, self.world.bottles.type
+                    self._fill = self._fill or entry(fill_column, *arguments)
+                    self._fill(*arguments)
 
     def _resize(self, slots: int) -> None:
         """Make room for more bottles. Lists stay as they are, because tangential springs belong to their entries."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The project of examples/brewery/plc gives the commands of brewery.py on the same inputs; its mutants do not."""
+"""The project in config/brewery/plc gives the commands of control/brewery.py on the same inputs; its mutants do not."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from pathlib import Path
 
 import pytest
 
-from conveyor_sim.control.load import load
+from conveyor_sim.control.brewery import brewery
 from conveyor_sim.control.scan import Controller, Inputs, LineTags, bind
 from conveyor_sim.control.st.controller import StructuredText
+from conveyor_sim.support.resources import config_dir
 from conveyor_sim.testing import Scenario
 
-BREWERY = Path(__file__).resolve().parents[3] / "examples" / "brewery"
+PROJECT = config_dir() / "brewery" / "plc"
 SCANS = 6000
 LENGTH = 0.01  # s
 LEVELS = {
-    "zones/supply/bottles": 3200,
-    "zones/filled/bottles": 900,
-    "zones/cold/bottles": 1300,
-    "zones/packing/bottles": 900,
+    "zones/supply/bottles": 2200,
+    "zones/filled/bottles": 850,
+    "zones/cold/bottles": 1250,
+    "zones/packing/bottles": 850,
 }
 """Largest numbers of bottles in the zones of the V-curve."""
 
@@ -44,7 +45,7 @@ class FirstScan:
 def line() -> FirstScan:
     """Return the tags of the line, and its inputs at standstill."""
     found = FirstScan()
-    plant = Scenario(BREWERY / "brewery.yaml", {"bottles": []})
+    plant = Scenario("brewery", {"bottles": []})
     plant.attach(found)
     plant.run_for(LENGTH)
     return found
@@ -111,7 +112,7 @@ def commands(controller: Controller, line: FirstScan) -> list[Mapping[str, float
 @pytest.fixture(scope="module")
 def expected(line: FirstScan) -> list[Mapping[str, float]]:
     """Return the commands of the controller in Python."""
-    return commands(load(f"{BREWERY / 'brewery.py'}:brewery"), line)
+    return commands(brewery(), line)
 
 
 def test_the_project_is_its_twin(line: FirstScan, expected: list[Mapping[str, float]]) -> None:
@@ -120,7 +121,7 @@ def test_the_project_is_its_twin(line: FirstScan, expected: list[Mapping[str, fl
     for name in ("panel/horn/on", "panel/empties/on", *(f"machines/{name}" for name in machines)):
         assert {answer[name] for answer in expected} == {0.0, 1.0}
     assert len({answer["machines/packer/rate"] for answer in expected}) >= 8
-    assert commands(StructuredText(BREWERY / "plc"), line) == expected
+    assert commands(StructuredText(PROJECT), line) == expected
 
 
 @pytest.mark.parametrize(
@@ -139,7 +140,7 @@ def test_the_project_is_its_twin(line: FirstScan, expected: list[Mapping[str, fl
 def test_a_mutant_is_not(
     file: str, right: str, wrong: str, line: FirstScan, expected: list[Mapping[str, float]], tmp_path: Path
 ) -> None:
-    for path in (BREWERY / "plc").glob("*.st"):
+    for path in PROJECT.glob("*.st"):
         text = path.read_text()
         assert text.count(right) == (path.name == file)
         (tmp_path / path.name).write_text(text.replace(right, wrong))

@@ -140,3 +140,14 @@ def test_what_no_line_can_have_is_refused(forces: list[object]) -> None:
     memory["forcing"]["forces"] = forces
     with pytest.raises(ValueError, match=r"line\.forcing"):
         sim.line.restore(sim.tick, memory)
+
+
+def test_some_signals_are_read_as_all_of_them_are() -> None:
+    sim = passing()
+    sim.advance(20)
+    after(sim, force((SPEED, 0.3)))
+    every = dict(zip(sim.process_image.signal_names, sim.signals().tolist(), strict=True))
+    for names in (sim.process_image.signal_names[::-1], ("belts/one/mode", SPEED), (REMOVED,), ()):
+        assert sim.values_of(names) == {name: every[name] for name in names}
+    with pytest.raises(KeyError):
+        sim.values_of(("belts/one/sped",))

@@ -9,7 +9,7 @@ import pytest
 from facts import missing
 from scenes import base, belt, bottle, simulation
 
-from conveyor_sim.line.commands.refusal import refusal, shown
+from conveyor_sim.line.commands.refusal import CommandLimits, refusal, shown
 from conveyor_sim.line.tag import Tag, count, number, switch
 from conveyor_sim.simulation import Simulation
 
@@ -166,3 +166,23 @@ def test_what_is_refused_is_repeated_in_printable_words_once_and_for_all() -> No
     sim.advance()
     (again,) = sim.take_outcomes()
     assert (again.names, again.source, again.reason) == (outcome.names, outcome.source, outcome.reason)
+
+
+@pytest.mark.parametrize("value", [-9.5, -9.0, -1.0, -0.0, 0.0, 0.5, 1.0, 2.0, 9.0, math.inf, -math.inf, math.nan])
+def test_the_fast_check_admits_what_has_no_refusal(value: float) -> None:
+    known = named((*COMMANDS, *OTHERS))
+    limits = CommandLimits(known)
+    for name in known:
+        for names, values in (((name,), (value,)), ((*named(COMMANDS), name), (0.5, 0.5, value))):
+            fits = refusal(known, "command", names, values) == ""
+            assert limits.admit(names, values) is fits
+            assert limits.admit(names, values) is fits  # of the same names again
+
+
+def test_the_fast_check_leaves_unusual_commands_to_the_refusal() -> None:
+    unlimited = number("field/write", "setpoint", "Value.", "1", -math.inf, math.inf)
+    limits = CommandLimits(named((*COMMANDS, unlimited)))
+    speed = COMMANDS[0].name
+    for names in ((), (speed, speed), ("none",), ("alarms/a",), (unlimited.name,)):
+        assert not limits.admit(names, (0.0,) * len(names))
+    assert not limits.admit((speed,), (0.0, 0.0))

@@ -23,7 +23,7 @@ from conveyor_sim.scene.marks import marks_of
 
 pytest.importorskip("ezdxf", reason="ezdxf is not installed: pip install conveyor-sim[cad]")
 
-DRAWN = ("belts", "rails", "photo_eyes", "counters", "zones", "outfeeds", "infeeds")
+DRAWN = ("belts", "plates", "rails", "photo_eyes", "counters", "zones", "outfeeds", "infeeds")
 """Sections that are made anew; the others stay as they are in the scene."""
 MAP = """
 CONVEYORS: {as: conveyor, material: $BELT}
@@ -73,7 +73,8 @@ def imported_again(scene: Scene, folder: Path) -> Scene:
     for star in base.get("stars", {}).values():
         star.pop("guide", None)  # drawn as a rail
     (folder / "base.yaml").write_text(json.dumps(base))
-    return parse_scene(scene_text(result.sections, "test", folder / "base.yaml"))
+    full = {name: {"full_at": zone.full_at} for name, zone in scene.zones.items() if zone.full_at is not None}
+    return parse_scene(scene_text(result.sections, "test", folder / "base.yaml"), overrides={"zones": full})
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=shipped_name)

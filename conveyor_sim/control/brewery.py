@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Controller of brewery.yaml: start, stop and changeover of the line, its combiners, V-curve and reject.
+"""Controller of `config/brewery.yaml`: start, stop and changeover of the line, its combiners, V-curve and reject.
 
-cd examples/brewery; conveyor-sim serve brewery.yaml --controller brewery.py:brewery --web
-
-The folder plc has the same controller in Structured Text.
+`config/brewery/plc/` has the same controller in Structured Text.
 """
 
 from __future__ import annotations
@@ -12,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import IntEnum
 
+from conveyor_sim.control.cell import in_cell
 from conveyor_sim.control.filler_block import FillerBlock
 from conveyor_sim.control.level import Count
 from conveyor_sim.control.reject import TrackedReject
@@ -85,7 +84,7 @@ class Combiner:
 
 @dataclass
 class BottlingLine:
-    """Control of `brewery.yaml`, without the rates of machines.
+    """Control of `config/brewery.yaml`, without the rates of machines.
 
     The start button starts the line after a warning by the horn, and the filler block with it. The stop button (NC) and
     the emergency stop end it. After an emergency stop, the reset button precedes the next start. A turn of the selector
@@ -165,8 +164,8 @@ class BottlingLine:
         return LineStep.EMPTYING
 
 
-def brewery(supply: float = 14.0, buffer: float = 9.0) -> Controller:
-    """Return the controller of `brewery.yaml`: the sequence of the line, its V-curve, and the reject.
+def brewery(supply: float = 9.0, buffer: float = 8.0) -> Controller:
+    """Return the controller of `config/brewery.yaml`: the sequence of the line, its V-curve, and the reject.
 
     supply, buffer: lengths of the wide conveyors before and behind the block, m, the scene's parameters.
     """
@@ -201,10 +200,10 @@ def brewery(supply: float = 14.0, buffer: float = 9.0) -> Controller:
 
 
 def v_curve(supply: float, buffer: float) -> VCurve:
-    """Return the rates of the machines around the filler block of `brewery.yaml`, with levels that suit the lengths."""
+    """Return the rates of the machines around the filler block of the brewery, with levels that suit the lengths."""
 
     def neighbour(machine: str, zone: str, *levels: float) -> Neighbour:
-        size = supply / 14.0 if zone == "supply" else buffer / 9.0
+        size = {"supply": supply / 9.0, "cold": 1.0}.get(zone, buffer / 8.0)
         low, target, high = (level * size for level in levels)
         return Neighbour(f"machines/{machine}/rate", Count(f"zones/{zone}/bottles"), low, target, high)
 
@@ -212,10 +211,15 @@ def v_curve(supply: float, buffer: float) -> VCurve:
         bottleneck=None,
         rate="panel/rate/value",
         margin=0.04,
-        upstream=(neighbour("depalletiser", "supply", 2200, 2600, 3000),),
+        upstream=(neighbour("depalletiser", "supply", 1400, 1650, 1900),),
         downstream=(
-            neighbour("pasteuriser", "filled", 300, 500, 700),
-            neighbour("labeller", "cold", 300, 900, 1100),
-            neighbour("packer", "packing", 300, 500, 700),
+            neighbour("pasteuriser", "filled", 270, 450, 630),
+            neighbour("labeller", "cold", 700, 850, 1000),
+            neighbour("packer", "packing", 270, 450, 630),
         ),
     )
+
+
+def hall() -> Controller:
+    """Return the controller of `config/brewery/hall.yaml`, ten lines of the brewery."""
+    return together(*(in_cell(brewery(), f"line_{number}") for number in range(10)))
