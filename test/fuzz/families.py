@@ -171,7 +171,6 @@ _PLAIN = Family(
 )
 
 CI_FAMILIES = (
-    _PLAIN,
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(
         types=2,
