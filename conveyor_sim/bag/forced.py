@@ -15,7 +15,11 @@ def forced_signals(bag: Bag) -> tuple[str, ...]:
     for frame in bag.messages("signals"):  # the first has signals forced before the start
         names.update((bag.line.signal_names[place], None) for place in to_image(frame.data).forced)
         break
-    for outcome in bag.outcomes():
-        if outcome.data.accepted and outcome.data.operation == FORCE:
-            names.update(dict.fromkeys(outcome.data.names))
+    word = FORCE.encode()
+    for _, _, data in bag.raw({"outcomes"}):
+        if word not in data:  # decoding the commands of each scan would take long
+            continue
+        outcome = bag.decode("outcomes", data)
+        if outcome.accepted and outcome.operation == FORCE:
+            names.update(dict.fromkeys(outcome.names))
     return tuple(printable(name) for name in names)

@@ -7,7 +7,7 @@ import mmap
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property, lru_cache
-from heapq import heappop, heappush, merge
+from heapq import merge
 from operator import itemgetter
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,9 @@ from rosbags.rosbag2.metadata import parse_qos
 from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
-from conveyor_sim.bag.mcap.chunk import MESSAGE, messages_of, read_content
+from conveyor_sim.bag.mcap.chunk import MESSAGE, in_time_order
 from conveyor_sim.bag.mcap.records import Data
 from conveyor_sim.bag.mcap.salvage import IDL, Salvage
-from conveyor_sim.bag.mcap.walk import ValidChunk
 from conveyor_sim.bag.mcap.writer import QOS_KEY
 from conveyor_sim.bag.message_reader import Raw, RecordedTopic
 from conveyor_sim.bag.messages.qos import Qos
@@ -161,18 +160,10 @@ def _named(file: Salvage, topics: Collection[str]) -> dict[int, str]:
 
 
 def _chunked(file: Salvage, topics: Collection[str]) -> Iterator[Raw]:
-    """Yield the messages in chunks in time order. Only chunks that overlap in time are in memory at once."""
+    """Yield the messages in chunks in time order."""
     names = _named(file, topics)
-    waiting: list[tuple[int, int, int, Raw]] = []  # time, chunk, place in it
-    wanted: list[ValidChunk] = [one for one in file.chunks if one.counts.keys() & names.keys()]
-    for one in sorted(wanted, key=lambda one: (one.chunk.start_ns, one.chunk.start)):
-        while waiting and waiting[0][0] < one.chunk.start_ns:
-            yield heappop(waiting)[-1]
-        content = read_content(file.data, one.chunk)
-        for place, raw in enumerate(messages_of(content, names)):
-            heappush(waiting, (raw[1], one.chunk.start, place, raw))
-    while waiting:
-        yield heappop(waiting)[-1]
+    chunks = [one.chunk for one in file.chunks if one.counts.keys() & names.keys()]
+    return in_time_order(file.data, sorted(chunks, key=lambda chunk: (chunk.start_ns, chunk.start)), names)
 
 
 def _loose(file: Salvage, topics: Collection[str]) -> Iterator[Raw]:

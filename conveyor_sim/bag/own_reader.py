@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 import mmap
 from collections.abc import Collection, Iterator, Sequence
 from functools import cached_property
@@ -10,34 +11,17 @@ from pathlib import Path
 from typing import Any
 
 from mcap.opcode import Opcode
-from mcap.reader import SeekingReader
-from mcap.records import Header
-from mcap.summary import Summary
+from mcap.records import ChunkIndex, Header
 
 from conveyor_sim.bag.channels import ENCODING, metadata_of, schema_of
+from conveyor_sim.bag.mcap.chunk import Chunk, chunk_at, in_time_order
 from conveyor_sim.bag.mcap.index import Index, read_index
-from conveyor_sim.bag.mcap.records import LIMIT, MAGIC, RECORD_HEAD, Data, head_at, parse
+from conveyor_sim.bag.mcap.records import MAGIC, RECORD_HEAD, Data, Malformed, head_at, parse
 from conveyor_sim.bag.mcap.writer import LIBRARY, PROFILE, Schema
 from conveyor_sim.bag.message_reader import Raw, RecordedTopic
 from conveyor_sim.bag.messages.cdr import tick_of
 from conveyor_sim.bag.messages.topics import OUTPUTS
 from conveyor_sim.bag.messages.typestore import DEFAULT, type_hash, typestore
-
-
-class _IndexedReader(SeekingReader):
-    """Reader of a file whose index has been read. The library would read it a second time."""
-
-    def __init__(self, index: Index, data: mmap.mmap) -> None:
-        super().__init__(data, validate_crcs=True, record_size_limit=LIMIT)  # type: ignore[arg-type]
-        self._known = Summary()
-        self._known.schemas = index.schemas
-        self._known.channels = index.channels
-        self._known.statistics = index.statistics
-        self._known.chunk_indexes = index.chunks
-
-    def get_summary(self) -> Summary:
-        """Return the index."""
-        return self._known
 
 
 class OwnReader:
@@ -47,8 +31,8 @@ class OwnReader:
         assert index.statistics is not None
         self._channels = index.channels
         self._statistics = index.statistics
+        self._chunks = index.chunks
         self._data = data
-        self._reader = _IndexedReader(index, data)
 
     @cached_property
     def topics(self) -> Sequence[RecordedTopic]:
@@ -70,8 +54,17 @@ class OwnReader:
 
         topics: absolute names. start_ns, stop_ns: interval of log times, without its end; None: no limit.
         """
-        for _, channel, message in self._reader.iter_messages(topics, starting_at=start_ns, ending_before=stop_ns):
-            yield channel.topic, message.log_time, message.data
+        names = {number: channel.topic for number, channel in self._channels.items() if channel.topic in topics}
+        start, stop = -math.inf if start_ns is None else start_ns, math.inf if stop_ns is None else stop_ns
+        chosen = [
+            one
+            for one in self._chunks
+            if start <= one.message_end_time and one.message_start_time < stop
+            if one.message_index_offsets.keys() & names.keys()
+        ]
+        chosen.sort(key=lambda one: (one.message_start_time, one.chunk_start_offset))
+        chunks = (_chunk_of(self._data, one) for one in chosen)
+        return (raw for raw in in_time_order(self._data, chunks, names) if start <= raw[1] < stop)
 
     def deserialize(self, data: bytes, type_name: str) -> Any:
         """Return a rosbags message object."""
@@ -88,6 +81,13 @@ class OwnReader:
     def close(self) -> None:
         """Close the file."""
         self._data.close()
+
+
+def _chunk_of(data: Data, index: ChunkIndex) -> Chunk:
+    """Return a chunk by its index. Raise Malformed if there is none."""
+    if (chunk := chunk_at(data, index.chunk_start_offset)) is None:
+        raise Malformed("it has no chunk where its index states one")
+    return chunk
 
 
 def own_reader(file: Path) -> OwnReader | None:

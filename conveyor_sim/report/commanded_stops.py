@@ -7,35 +7,36 @@ The signal `stop_reason` keeps a failure as the reason for a stop, also if the m
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from operator import itemgetter
 
-from conveyor_sim.bag.messages.topics import TOPICS
-from conveyor_sim.bag.reader import Bag
 from conveyor_sim.line.machines.packml import Command
+from conveyor_sim.report.command_changes import Change
 from conveyor_sim.report.periods import Period
 
-_STOP = {"run": (0.0, "command run"), "cntrl_cmd": (float(Command.STOP), "command Stop")}
+STOP = {"run": (0.0, "command run"), "cntrl_cmd": (float(Command.STOP), "command Stop")}
 """By command: value that stops the machine, and its stop reason."""
 
 
 class CommandedStops:
     """Times at which the commands of machines demand a stop."""
 
-    def __init__(self, bag: Bag, machines: Sequence[str]) -> None:
-        """Read the read-back of the machines' commands; a recording without it has none."""
+    def __init__(
+        self, machines: Sequence[str], changes: Mapping[str, Sequence[Change]], time: Callable[[int], float]
+    ) -> None:
+        """Derive them from the changes of the commands in STOP, by name. time: returns the time of a tick, s."""
         self._changes: dict[str, list[tuple[float, str]]] = {machine: [] for machine in machines}
-        if bag.types.get("readback") != TOPICS["readback"].type:
-            return
-        places = {name: place for place, name in enumerate(bag.line.command_names)}
-        for frame in bag.read("readback"):
-            for machine, changes in self._changes.items():
-                reason = ""
-                for command, (value, text) in _STOP.items():
-                    place = places.get(f"{machine}/{command}")
-                    if not reason and place is not None and frame.data.value[place] == value:
-                        reason = text
-                if reason != (changes[-1][1] if changes else ""):
-                    changes.append((frame.time, reason))
+        for machine, reasons in self._changes.items():
+            own = [
+                (tick, command, value) for command in STOP for tick, value in changes.get(f"{machine}/{command}", ())
+            ]
+            values: dict[str, float] = {}
+            for tick, together in groupby(sorted(own, key=itemgetter(0)), key=itemgetter(0)):
+                values |= {command: value for _, command, value in together}
+                reason = next((text for command, (value, text) in STOP.items() if values.get(command) == value), "")
+                if reason != (reasons[-1][1] if reasons else ""):
+                    reasons.append((time(tick + 1), reason))  # states are reported at the end of a scan
 
     def applied(self, period: Period) -> list[Period]:
         """Return the parts of a period, with the reason of each.

@@ -9,7 +9,7 @@ A cycle that began before the span counts with its part within it, rounded down 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from conveyor_sim.bag.messages.encode import to_image
 from conveyor_sim.bag.reader import Bag, Frame
 from conveyor_sim.columns.counters import CounterColumns
-from conveyor_sim.line.commands.inputs import SET
 from conveyor_sim.line.machines.counter_rows import TEXTS, DeviceSums, counter_row, line_row
 from conveyor_sim.line.machines.efficiency import CATEGORIES
+from conveyor_sim.report.command_changes import Change
 from conveyor_sim.report.periods import Period
 from conveyor_sim.report.span import Span
 from conveyor_sim.scene import parse_again, parse_overrides
@@ -29,6 +29,9 @@ from conveyor_sim.scene.parts.source import Source
 
 Counts = NDArray[np.int64]
 """(devices + 1, 4): COUNTS of each row of the counters."""
+
+RATE = "rate"
+"""Last part of the name of the command that sets a machine's rate."""
 
 COUNTS = ("processed", "defective", "rejected", "failures")
 
@@ -45,11 +48,15 @@ SIGNALS: Mapping[str, Mapping[str, str]] = {
 
 
 def counters_within(
-    bag: Bag, span: Span, frames: Sequence[Frame[CounterColumns]], periods: Mapping[str, Sequence[Period]]
+    bag: Bag,
+    span: Span,
+    frames: Sequence[Frame[CounterColumns]],
+    periods: Mapping[str, Sequence[Period]],
+    changes: Mapping[str, Sequence[Change]],
 ) -> CounterColumns:
     """Return the counters as if they had been reset at the start of a span, and read at its end.
 
-    frames: all recorded counters. periods: of each machine, within the span.
+    frames: all recorded counters. periods: of each machine, within the span. changes: of the command RATE of machines.
     """
     last, tick = frames[-1].data, int(bag.line.tick_ns) * 1e-9
     names = list(last.name)
@@ -63,7 +70,11 @@ def counters_within(
         counted[-1, 1] = counted[exits, 1].sum()
     counted[-1, 0] = counted[exits, 0].sum()
     counted[-1, 2] = counted[:-1, 2].sum()
-    rates = _set_rates(bag, last)
+    rates = {
+        name: _SetRate(float(rate), changes.get(f"{name}/{RATE}", ()), bag.time)
+        for name, rate in zip(last.name, last.rate, strict=True)
+        if math.isfinite(rate)
+    }
     batches = _batches(bag) if span.start > 0 else {}
     intervals = {}
     for row, name in enumerate(names[:-1]):
@@ -74,8 +85,8 @@ def counters_within(
         cycles = float(counted[row, 0])
         if row in images.first_cycles and name in rates and span.start > 0:  # a cycle may have begun before the span
             batch = float(batches.get(name, 1))
-            cycles += min(batch, _at_set_rate(ran, rates[name], images.first_cycles[row] * tick)) - batch
-        set_cycles = _at_set_rate(ran, rates[name], math.inf) if name in rates else 0.0
+            cycles += min(batch, rates[name].cycles(ran, images.first_cycles[row] * tick)) - batch
+        set_cycles = rates[name].cycles(ran, math.inf) if name in rates else 0.0
         numbers = tuple(counted[row].tolist())
         rated = float(last.rate[row]), float(last.rate_limit[row])
         intervals[name] = DeviceSums(numbers, cycles, set_cycles, times, *rated)
@@ -125,25 +136,29 @@ class _Images:
     """Counts in the process images of a span."""
 
     def __init__(self, bag: Bag, shown: Sequence[tuple[int, int, int]], span: Span, rows: int) -> None:
-        """Read the first image, the following ones until every device has completed a cycle, and the last one."""
+        """Decode the first image, the following ones until every device has completed a cycle, and the last one."""
         self._shown, self._rows = shown, rows
         self.first_cycles: dict[int, int] = {}
         """Tick of the last image before each device completed its first cycle, by row."""
         self.counts = np.zeros((rows, len(COUNTS)), dtype=np.int64)
         """Counts (rows, 4) between the first and the last image."""
-        ticks = sorted(tick for tick in bag.ticks("signals").tolist() if span.has(tick)) if shown else []
-        begin = before = None
-        for frame in bag.messages("signals", set(ticks)) if ticks else ():
-            now = self._read(frame.data)
-            if begin is None or before is None:
-                begin, before = now, frame.tick
+        counting = len({row for row, column, _ in shown if column == 0})
+        begin: Counts | None = None
+        before, last = 0, b""
+        for _, _, data in bag.raw({"signals"}) if shown else ():
+            tick = bag.tick("signals", data)
+            if not span.has(tick):
+                continue
+            last = data
+            if begin is not None and len(self.first_cycles) == counting:
+                continue
+            now = self._read(bag.decode("signals", data))
+            begin = now if begin is None else begin
             for row in np.flatnonzero(now[:, 0] > begin[:, 0]).tolist():
                 self.first_cycles.setdefault(row, before)
-            before = frame.tick
-            if len(self.first_cycles) == len({row for row, column, _ in shown if column == 0}):
-                break
-        for frame in bag.messages("signals", set(ticks[-1:])) if ticks else ():
-            self.counts = self._read(frame.data) - (0 if begin is None else begin)
+            before = tick
+        if begin is not None:
+            self.counts = self._read(bag.decode("signals", last)) - begin
 
     def _read(self, message: Any) -> Counts:
         counts, values = np.zeros((self._rows, len(COUNTS)), dtype=np.int64), to_image(message).truth
@@ -176,25 +191,22 @@ def _never_reset(frames: Sequence[Frame[CounterColumns]]) -> Iterator[tuple[int,
         yield frame.tick, _totals(before) + lost
 
 
-def _set_rates(bag: Bag, last: CounterColumns) -> dict[str, list[tuple[float, float]]]:
-    """Return the times (s) from which each machine had a set rate (1/s), by its name."""
-    rates = {
-        name: [(-math.inf, float(rate))] for name, rate in zip(last.name, last.rate, strict=True) if math.isfinite(rate)
-    }
-    for frame in bag.outcomes():
-        if frame.data.accepted and frame.data.operation == SET:
-            for name, value in zip(frame.data.names, frame.data.values, strict=True):
-                device, _, end = name.rpartition("/")
-                if end == "rate" and device in rates:
-                    rates[device].append((frame.time, float(value)))
-    return rates
+class _SetRate:
+    """Set rate of one machine over time."""
 
+    def __init__(self, initial: float, changes: Sequence[Change], time: Callable[[int], float]) -> None:
+        """Integrate the changed rates. initial: rate without a change, 1/s. time: returns the time of a tick, s."""
+        self._times = np.array([time(change.tick) for change in changes] or [0.0])
+        self._rates = np.array([change.value for change in changes] or [initial])
+        self._work = np.concatenate([[0.0], np.cumsum(self._rates[:-1] * np.diff(self._times))])
 
-def _at_set_rate(ran: Sequence[Period], rates: Sequence[tuple[float, float]], until: float) -> float:
-    """Return the cycles at the set rate in the time running up to a time (s)."""
-    ends = [begin for begin, _ in rates[1:]] + [math.inf]
-    return sum(
-        rate * max(0.0, min(period.end, end, until) - max(period.begin, begin))
-        for period in ran
-        for (begin, rate), end in zip(rates, ends, strict=True)
-    )
+    def cycles(self, ran: Sequence[Period], until: float) -> float:
+        """Return the cycles at the set rate in the time running up to a time (s)."""
+        ends = np.array([(min(period.begin, until), min(period.end, until)) for period in ran]).reshape(-1, 2)
+        return float(np.sum(self._done(ends[:, 1]) - self._done(ends[:, 0])))
+
+    def _done(self, at: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the integral of the rate from the first change up to times (s)."""
+        place = np.maximum(np.searchsorted(self._times, at, side="right") - 1, 0)
+        done: NDArray[np.float64] = self._work[place] + self._rates[place] * (at - self._times[place])
+        return done

@@ -16,8 +16,9 @@ from conveyor_sim.bag.reader import Bag, Frame, open_bag
 from conveyor_sim.columns.counters import CounterColumns
 from conveyor_sim.errors import BagError
 from conveyor_sim.report.alarm_figures import AlarmFigures, AlarmTally
-from conveyor_sim.report.commanded_stops import CommandedStops
-from conveyor_sim.report.interval import counters_within
+from conveyor_sim.report.command_changes import command_changes
+from conveyor_sim.report.commanded_stops import STOP, CommandedStops
+from conveyor_sim.report.interval import RATE, counters_within
 from conveyor_sim.report.periods import Period
 from conveyor_sim.report.span import Times, span_of
 from conveyor_sim.support.printable import printable
@@ -86,14 +87,15 @@ def read_production(path: Path, times: Times | None = None) -> Production:
                 if kind == "machine_state":
                     follower.take(bag.time(int(at)), name, printable(text))
         tick, periods = int(bag.line.tick_ns) * 1e-9, follower.finished(end)
-        commanded = CommandedStops(bag, list(periods))
+        commands = command_changes(bag, [f"{name}/{command}" for name in periods for command in (*STOP, RATE)])
+        commanded = CommandedStops(list(periods), commands, bag.time)
         periods = {name: [part for one in of for part in commanded.applied(one)] for name, of in periods.items()}
         span = None
         # Recordings before format 3 keep the figures that they hold, unless times are given.
         if times is not None and (bag.format >= 3 or times != Times()):
             span = span_of(times, frames[0].tick, round(end / tick), left, tick)
             periods = {name: _clipped(of, bag.time(span.start), bag.time(span.stop)) for name, of in periods.items()}
-            counters = counters_within(bag, span, frames, periods)
+            counters = counters_within(bag, span, frames, periods, commands)
         start, end = (frames[0].time, end) if span is None else (bag.time(span.start), bag.time(span.stop))
         alarms = AlarmTally()
         for event in raised:

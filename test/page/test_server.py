@@ -18,13 +18,13 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from mcap import reader
 from page.line import LINE, record
 from page.pixels import TYPE_COLOURS, canvas, disc, settled, to_pixels
 from page.test_page import clock
 from protocols.waiting import until
 
 from conveyor_sim.bag import own_reader
+from conveyor_sim.bag.mcap import chunk
 from conveyor_sim.bag.mcap.chunk import next_chunk
 from conveyor_sim.bag.messages.encode import Header
 from conveyor_sim.bag.messages.topics import TOPICS
@@ -294,14 +294,14 @@ def test_only_the_chunks_of_a_moment_are_read_of_a_long_recording(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read: set[int] = set()
-    really_read = reader.breakup_chunk
+    really_read = chunk.read_content
 
-    def noted(chunk: Any, validate_crc: bool = False) -> Any:
-        read.add(chunk.message_start_time)
-        return really_read(chunk, validate_crc)
+    def noted(data: Any, one: chunk.Chunk) -> bytes:
+        read.add(one.start)
+        return really_read(data, one)
 
     bag = written(tmp_path / "bag", 120.0)
-    monkeypatch.setattr(reader, "breakup_chunk", noted)
+    monkeypatch.setattr(chunk, "read_content", noted)
     with open_bag(bag, by_index=True) as opened:
         recording = PageRecording(opened, SERVED)
         recording.head()
@@ -318,11 +318,11 @@ def test_the_first_frame_needs_as_much_of_a_long_recording_as_of_a_short_one(
 ) -> None:
     """The page asks for the head, the tick with the most bottles, and the blocks that it draws first."""
     read: list[int] = []
-    really_read = reader.breakup_chunk
+    really_read = chunk.read_content
 
-    def noted(chunk: Any, validate_crc: bool = False) -> Any:
-        read.append(len(chunk.data))
-        return really_read(chunk, validate_crc)
+    def noted(data: Any, one: chunk.Chunk) -> bytes:
+        read.append(one.content_stop - one.content)
+        return really_read(data, one)
 
     indexes: list[Path] = []
     really_open = own_reader.own_reader
@@ -331,9 +331,8 @@ def test_the_first_frame_needs_as_much_of_a_long_recording_as_of_a_short_one(
         indexes.append(file)
         return really_open(file)
 
-    monkeypatch.setattr(reader, "breakup_chunk", noted)
+    monkeypatch.setattr(chunk, "read_content", noted)
     monkeypatch.setattr("conveyor_sim.bag.reader.own_reader", noted_index)
-    monkeypatch.delattr(reader, "_read_summary_from_stream_reader")  # the library would read the index again
     chunks, content = [], []
     for seconds in (90.0, 900.0):
         bag = written(tmp_path / f"bag_{seconds:.0f}", seconds, 20)

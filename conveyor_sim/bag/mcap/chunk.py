@@ -6,8 +6,9 @@ from __future__ import annotations
 import re
 import struct
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from heapq import heappop, heappush
 
 import lz4.frame  # type: ignore[import-untyped]
 import zstandard
@@ -241,6 +242,22 @@ def messages_of(content: bytes, names: Mapping[int, str]) -> Iterator[tuple[str,
             channel, _, log_time, _ = MESSAGE.unpack_from(content, body)
             if (topic := names.get(channel)) is not None:
                 yield topic, log_time, content[body + MESSAGE.size : position]
+
+
+def in_time_order(data: Data, chunks: Iterable[Chunk], names: Mapping[int, str]) -> Iterator[tuple[str, int, bytes]]:
+    """Yield topic, log time (ns) and bytes of the messages of valid chunks, for the channels in `names`.
+
+    chunks: by their first time, equal ones in the order of the file. Messages of equal times keep their order in the
+    file. Only chunks that overlap in time are in memory at once. Raises Malformed.
+    """
+    waiting: list[tuple[int, int, int, tuple[str, int, bytes]]] = []  # time, chunk, place in it
+    for chunk in chunks:
+        while waiting and waiting[0][0] < chunk.start_ns:
+            yield heappop(waiting)[-1]
+        for place, raw in enumerate(messages_of(read_content(data, chunk), names)):
+            heappush(waiting, (raw[1], chunk.start, place, raw))
+    while waiting:
+        yield heappop(waiting)[-1]
 
 
 def _decompressed(data: bytes, compression: str, size: int) -> Iterator[bytes]:
