@@ -208,6 +208,11 @@ class Device:
         """Apply an accepted command or fault, by its full name, at the start of a tick."""
         raise NotImplementedError(f"{self.name} takes no commands")
 
+    @property
+    def takes_repeats(self) -> bool:
+        """False if a command changes nothing that repeats the value of the same controller."""
+        return True
+
     def mode_objection(self) -> str:
         """Return why the control mode can't change now, "" if it can."""
         return ""

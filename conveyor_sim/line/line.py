@@ -191,7 +191,10 @@ class Line:
         self.image = ProcessImage((*tags, *self.modes.signals, *RUN_TAGS))
         self.forcing = Forcing(self.image.signals, self._log.note)
         """Forced signals."""
-        self.read_back = ReadBack(self.image.commands)
+        self.read_back = ReadBack(
+            self.image.commands,
+            frozenset(command.name for device in devices if device.takes_repeats for command in device.commands),
+        )
         """Present value and writer of each command."""
         self._owner = {entry.name: device for device in devices for entry in (*device.commands, *device.faults)}
         self._commands = {tag.name: tag for tag in self.image.commands}
@@ -307,12 +310,16 @@ class Line:
     def _set(self, request: Input, now: ScanContext) -> None:
         by_hand = self.modes.stops_by_hand(request)
         now.by_hand = request.writer_kind in PEOPLE
-        for name, value in zip(request.names, request.values, strict=True):
+        if now.by_hand:
+            commands = list(zip(request.names, request.values, strict=True))
+        else:
+            commands = self.read_back.changed(request)
+        for name, value in commands:
             if name in by_hand:
                 self._owner[name].stop_by_hand(name, value)
             elif name in self._owner:  # not an alarm
                 self._owner[name].command(name, value, now)
-        self.read_back.note(request, now.tick)
+        self.read_back.note_values((request.writer, request.writer_kind), commands, now.tick)
 
     def take_outcomes(self) -> list[CommandOutcome]:
         """Return the results of inputs since the last call, in order."""

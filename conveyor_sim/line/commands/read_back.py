@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`ReadBack`: present value of each command, with its writer and the time of the last change."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import numpy as np
 
@@ -22,13 +22,19 @@ class ReadBack:
     writers: list[tuple[str, str]]
     """Names and kinds of the writers."""
 
-    def __init__(self, commands: Sequence[Tag]) -> None:
-        """Start with the scene's initial values."""
+    def __init__(self, commands: Sequence[Tag], repeating: Collection[str] = ()) -> None:
+        """Start with the scene's initial values.
+
+        repeating: names of commands that may have an effect although they repeat the value of the same writer.
+        """
+        self._repeating = repeating
         self._index = {command.name: place for place, command in enumerate(commands)}
         self.values = [float(command.initial) for command in commands]
         self.since = [0] * len(commands)
         self.writers = [SCENE] * len(commands)
         self._changed = True
+        self._names: tuple[str, ...] = ()
+        self._places: list[int | None] = []
 
     def begin(self) -> None:
         """Start a tick without changes."""
@@ -43,10 +49,26 @@ class ReadBack:
             raise ValueError(f"line.read_back.since is not from 0 to {tick}")
         self._changed = True
 
+    def changed(self, request: Input) -> list[tuple[str, float]]:
+        """Return the commands, faults and alarms of an input by name, without commands that change nothing."""
+        if request.names != self._names:
+            self._names = request.names
+            self._places = [None if name in self._repeating else self._index.get(name) for name in request.names]
+        by, values, writers = (request.writer, request.writer_kind), self.values, self.writers
+        commands = zip(request.names, request.values, self._places, strict=True)
+        return [
+            (name, value)
+            for name, value, place in commands
+            if place is None or values[place] != value or writers[place] != by
+        ]
+
     def note(self, request: Input, tick: int) -> None:
         """Record commands that were accepted or that the line has set."""
-        by = (request.writer, request.writer_kind)
-        for name, value in zip(request.names, request.values, strict=True):
+        self.note_values((request.writer, request.writer_kind), zip(request.names, request.values, strict=True), tick)
+
+    def note_values(self, by: tuple[str, str], commands: Iterable[tuple[str, float]], tick: int) -> None:
+        """Record commands by name. by: name and kind of their writer."""
+        for name, value in commands:
             place = self._index.get(name)
             if place is not None and (self.values[place] != value or self.writers[place] != by):
                 self.values[place], self.writers[place], self.since[place] = value, by, tick

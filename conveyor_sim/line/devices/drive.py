@@ -140,6 +140,11 @@ class DriveDevice(SetpointDevice):
             self.tripped = self.tripped or self.trip
             now.alarm(self._tripped, self.tripped)
 
+    @property
+    def takes_repeats(self) -> bool:
+        """True if a watchdog waits for commands."""
+        return self.watchdog is not None
+
     def _is_on(self, what: str) -> bool | None:
         """Return the state of a command's switch; None for the fault `trip`."""
         if what == "run":
@@ -172,8 +177,9 @@ class DriveDevice(SetpointDevice):
 
     def values(self, now: ScanContext) -> Sequence[float]:
         """Return the speed and the bottles of a belt, then running, at_speed, fault, and pulses."""
-        at_speed = abs(self.ramp.value - self.wanted(now)) <= AT_SPEED
-        values = [*super().values(now), self._runs, at_speed, self.tripped]
+        runs = self._runs
+        at_speed = abs(self.ramp.value - self._commanded(runs, now)) <= AT_SPEED
+        values = [*super().values(now), runs, at_speed, self.tripped]
         if self._drive.pulses_per_metre is not None:
             values.append(math.floor(self.travel * self._drive.pulses_per_metre + 1e-9))
         return values
@@ -188,7 +194,10 @@ class DriveDevice(SetpointDevice):
 
     def wanted(self, now: ScanContext) -> float:
         """Return the commanded speed, m/s; 0 while stopped, tripped or without power."""
-        if not self._runs:
+        return self._commanded(self._runs, now)
+
+    def _commanded(self, runs: bool, now: ScanContext) -> float:
+        if not runs:
             return 0.0
         setpoint = now.setpoints.item(self._index)
         return -setpoint if self.reverse else setpoint

@@ -154,6 +154,11 @@ class LightsDevice(Device):
             texts = {"on": "Lights it." if isinstance(part, Lamp) else "Sounds it."}
         super().__init__(name, [switch(f"{name}/{light}", "command", text) for light, text in texts.items()])
 
+    @property
+    def takes_repeats(self) -> bool:
+        """Return False."""
+        return False
+
     def command(self, name: str, value: float, now: ScanContext) -> None:
         """Take a command."""
 

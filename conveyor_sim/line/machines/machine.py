@@ -204,14 +204,19 @@ class MachineDevice(Device):
             self.failures += value != 0.0 and not self.stop
             self.stop = value != 0.0
             self._note_failures()
+        elif value == (self.run if what == "run" else self.cntrl_cmd):
+            return  # a repeated command changes nothing
         elif what == "run":
-            if self.run is (value != 0.0):
-                return  # a repeated command changes nothing
             self._switch(value != 0.0, now.by_hand)
-        elif value != self.cntrl_cmd:
+        else:
             self.cntrl_cmd = int(value)
             self._take(self.cntrl_cmd, now.by_hand)
         self._settle_state()
+
+    @property
+    def takes_repeats(self) -> bool:
+        """Return False."""
+        return False
 
     def _switch(self, run: bool, by_hand: bool) -> None:
         """Stop when the switch `run` turns off. Reset and start when it turns on, unless aborted."""

@@ -101,3 +101,30 @@ def test_more_writers_than_commands() -> None:
     sim.advance()
     columns = sim.line.read_back.columns()
     assert columns.writers == ("scene", "writer 19")
+
+
+def test_a_controller_that_repeats_its_commands_gets_the_same_bits() -> None:
+    """A drive, a machine and a lamp are commanded in every tick, or when a value changes."""
+    hashes = []
+    for every in (1, 7):
+        sim = simulation(
+            accuracy={"per_tick": 10},
+            base=base(0.4),
+            belts={"two": belt(0.3, (0.0, 0.0), 2.0, 1.0, drive={"acceleration": 1.0})},
+            bottles=[bottle(0.5, 0.5)],
+            machines={
+                "packer": {"kind": "sink", "region": [[1, 0], [2, 0], [2, 1], [1, 1]], "rate": 2.0, "ramp_up": 0.05}
+            },
+            panel={"lamp": {"kind": "lamp", "colour": "red"}},
+        )
+        names = (TWO, "belts/two/run", "belts/two/reset", "machines/packer/run", "machines/packer/cntrl_cmd",
+                 "panel/lamp/on")  # fmt: skip
+        for tick in range(42):
+            stage = tick // 7
+            if tick % every == 0:
+                values = (0.1 * stage, stage != 2, stage == 3, stage not in (1, 2), 3.0 * (stage == 4), stage % 2)
+                sim.command(names, values, writer="plc")
+            sim.advance()
+        assert [outcome.reason for outcome in sim.take_outcomes()] == [""] * (42 // every)
+        hashes.append(sim.full_state_hash())
+    assert hashes[0] == hashes[1]
