@@ -34,23 +34,28 @@ def hash_of(folder: Path) -> str:
 def test_what_decides_bits_changes_the_hash_and_nothing_else_does(copied: Path) -> None:
     package, before = copied / "conveyor_sim", hash_of(copied)
 
-    def edited(file: str, old: str, new: str) -> str:
-        """The hash with one edit."""
-        source = package / file
-        text = source.read_text()
-        assert old in text, f"{file} has no {old!r}"
-        source.write_text(text.replace(old, new, 1))
+    def edited(*edits: tuple[str, str, str]) -> str:
+        """The hash with edits: file, old text, new text."""
+        texts = {package / file: (package / file).read_text() for file, _, _ in edits}
+        for file, old, new in edits:
+            assert old in texts[package / file], f"{file} has no {old!r}"
+            (package / file).write_text(texts[package / file].replace(old, new, 1))
         found = hash_of(copied)
-        source.write_text(text)
+        for source, text in texts.items():
+            source.write_text(text)
         return found
 
     assert [len(part) for part in before.split()] == [16, 8]
-    assert edited("engine/integrators/motion.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
-    assert edited("scene/geometry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
-    assert edited("physics/stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74") != before
-    assert edited("line/devices/entry.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") != before
-    assert edited("simulation.py", "def state_hash(self", "def bits(self") != before
-    assert edited("physics/stepping/guard/guard.py", "\n\n\n", "\n\n\n# A comment.\n") == before
-    assert edited("cli/run.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
-    assert edited("report/figures/style.py", "\n\n\n", "\n\n\nUNUSED = 1\n\n\n") == before
-    assert hash_of(copied) == before
+    unused = "\n\n\n", "\n\n\nUNUSED = 1\n\n\n"
+    assert edited(("engine/integrators/motion.py", *unused)) != before
+    assert edited(("scene/geometry.py", *unused)) != before
+    assert edited(("physics/stepping/guard/guard.py", "DEEPEST = 0.75", "DEEPEST = 0.74")) != before
+    assert edited(("line/devices/entry.py", *unused)) != before
+    assert edited(("simulation.py", "def state_hash(self", "def bits(self")) != before
+    comment = "\n\n\n", "\n\n\n# A comment.\n"
+    without_effect = (
+        ("physics/stepping/guard/guard.py", *comment),
+        ("cli/run.py", *unused),
+        ("report/figures/style.py", *unused),
+    )
+    assert edited(*without_effect) == before

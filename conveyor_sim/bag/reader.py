@@ -94,9 +94,12 @@ class Bag(AbstractContextManager["Bag"]):
         if not line_topics:
             raise BagError(f"{path}: no message of type {LINE}, expected the latched topic line")
         self.namespace = line_topics[0].rpartition("/")[0]
-        self.format = self._recorded_format()
-        """Format of the recording, from 1 to encode.FORMAT."""
-        self.line: Any = next(iter(self.messages("line"))).data
+        _, _, data = next(iter(self.raw({"line"})))
+        with in_one_sentence(path, "a message of topic line can't be decoded", data):
+            line = source.deserialize(data, LINE)
+            self.format = self._recorded_format(line)
+            """Format of the recording, from 1 to encode.FORMAT."""
+            self.line: Any = upgraded(LINE, line, self.format) if "line" in self.older_topics else line
 
     def __exit__(self, *_: object) -> None:
         self.close()
@@ -249,13 +252,10 @@ class Bag(AbstractContextManager["Bag"]):
                     row[name].append(getattr(frame.data, name)[index])
         return {bottle: BottleSeries(**{n: np.array(v) for n, v in row.items()}) for bottle, row in rows.items()}
 
-    def _recorded_format(self) -> int:
+    def _recorded_format(self, line: Any) -> int:
         """Return the format of the recording. Raise BagError for one that this version does not know."""
         if (number := WITHOUT_NUMBER.get(hash_ := self.type_hash("line"))) is not None:
             return number
-        _, _, data = next(iter(self.raw({"line"})))
-        with in_one_sentence(self.path, "a message of topic line can't be decoded", data):
-            line = self._source.deserialize(data, LINE)
         if not hasattr(line, "format"):
             raise BagError(f"{self.path}: has an unknown definition of Line ({hash_}), expected one of conveyor_sim")
         if not 1 <= line.format <= FORMAT:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.columns.alarms import AlarmColumns
@@ -39,7 +40,10 @@ class Story:
         """time: returns the time of a tick, s. counters_every: least time between two entries of the counters, s."""
         self._time = time
         self._counters_every = counters_every
-        self._last: dict[str, dict[Any, Any]] = {"alarms": {}, "commands": {}}
+        self._alarms: dict[int, list[Any]] = {}
+        """State of each alarm, by number."""
+        self._commands: tuple[NDArray[np.float64], NDArray[np.object_]] | None = None
+        """Value and writer of each command."""
         self._counted = -math.inf
         self._worn = -math.inf
         self.data = _empty()
@@ -65,7 +69,7 @@ class Story:
 
     def _alarm_states(self, message: Any, time: float) -> None:
         columns = message if isinstance(message, AlarmColumns) else TOPICS["alarm_states"].unpack(message)
-        before = self._last["alarms"]
+        before = self._alarms
         for place, number in enumerate(columns.number.tolist()):
             self.data["alarms"][number] = {name: _plain(getattr(columns, name)[place]) for name in _DECLARED}
             state = [_plain(getattr(columns, name)[place]) for name in _ALARM]
@@ -76,13 +80,15 @@ class Story:
 
     def _readback(self, message: Any, time: float) -> None:
         columns = TOPICS["readback"].unpack(message)
-        before = self._last["commands"]
-        for place, value in enumerate(columns.value.tolist()):
-            writer = columns.writers[columns.writer[place]]
-            state = repr(value), writer
-            if before.get(place) != state:
-                before[place] = state
-                self.data["readback"].append([time, place, value, writer])
+        values = np.asarray(columns.value, dtype=np.float64)
+        writers = np.array(columns.writers, dtype=object)[columns.writer]
+        changed = np.ones(values.size, dtype=np.bool_)
+        if self._commands is not None:
+            # Equal bits: NaN is no change, and a zero of the other sign is one.
+            changed = (values.view(np.int64) != self._commands[0].view(np.int64)) | (writers != self._commands[1])
+        self._commands = values, writers
+        for place in np.flatnonzero(changed).tolist():
+            self.data["readback"].append([time, place, float(values[place]), writers[place]])
 
     def _counters(self, message: Any, time: float) -> None:
         if time < self._counted + self._counters_every - 1e-9:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from conveyor_sim.bag.messages.cdr import behind_tick
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.reader import Bag, open_bag
 from conveyor_sim.bag.recorded_scene import recorded_scene
@@ -63,6 +64,8 @@ class _Tally:
         """Number of messages of bottles."""
         self._ledger: Ledger | None = None
         self._outcomes: Counter[bool] = Counter()
+        self._repeated, self._result = b"", (False, False)
+        """Content of the last command result; whether it was accepted, and whether it tells of an arrival."""
         self._occasions = 0
         self._guard: list[tuple[str, str]] = []
         self._borne: LoadHistory | None = None
@@ -73,7 +76,11 @@ class _Tally:
         for topic, _, data in bag.raw():
             self._topics[topic][0] += 1
             self._topics[topic][1] += len(data)
-            if (row := TAKEN.get(bag.types[topic])) is not None:
+            if (row := TAKEN.get(bag.types[topic])) is None:
+                continue
+            if row.name == "outcomes":
+                self._take_outcome(topic, data)
+            else:
                 self._take(row.name, bag.decode(topic, data))
 
     def _take(self, topic: str, message: Any) -> None:
@@ -103,9 +110,17 @@ class _Tally:
                 self._alarms.event(self._bag.time(int(at)), kind, printable(name))
         elif topic == "alarm_states":
             self._alarms.states = read
-        elif topic == "outcomes":
-            self._outcomes[bool(message.accepted)] += 1
-            self._occasions += message.source == ARRIVAL  # which the line knows nothing of
+
+    def _take_outcome(self, topic: str, data: bytes) -> None:
+        """Count a command result. A controller repeats its commands, and equal messages are decoded once."""
+        self._last_tick = max(self._last_tick, self._bag.tick(topic, data))
+        content = behind_tick(data)
+        if content != self._repeated:
+            outcome = self._bag.decode(topic, data)
+            self._repeated, self._result = content, (bool(outcome.accepted), outcome.source == ARRIVAL)
+        accepted, is_arrival = self._result
+        self._outcomes[accepted] += 1
+        self._occasions += is_arrival  # which the line knows nothing of
 
     def summary(self, wall: float | None) -> Summary:
         forces = np.concatenate(self._forces) if self._forces else np.zeros(0)

@@ -7,7 +7,6 @@ forces need about n^2 sweeps to settle (`physics/timestep/settling.py`).
 
 from __future__ import annotations
 
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -125,29 +124,29 @@ def touching(x: F8, y: F8, radius: F8) -> tuple[I8, I8]:
 
 def queues(count: int, a: I8, b: I8) -> list[tuple[int, int]]:
     """Return bottles in the queue, and contacts, of each cluster of two or more. a, b: (P,), touching bottles."""
-    neighbours: list[list[int]] = [[] for _ in range(count)]
-    for i, j in zip(a.tolist(), b.tolist(), strict=True):
-        neighbours[i].append(j)
-        neighbours[j].append(i)
-    seen: set[int] = set()
+    bottle, other = np.stack([a, b], axis=1).ravel(), np.stack([b, a], axis=1).ravel()
+    others = other[np.argsort(bottle, kind="stable")].tolist()
+    degree = np.bincount(bottle, minlength=count)
+    ends = np.cumsum(degree).tolist()
+    neighbours = [others[begin:end] for begin, end in zip([0, *ends], ends, strict=False)]
+    seen, distance = [-1] * count, [-1] * count
     found = []
-    for start in range(count):
-        if start in seen or not neighbours[start]:
+    for start in np.flatnonzero(degree).tolist():
+        if seen[start] >= 0:
             continue
-        cluster, end = _farthest(neighbours, start)
-        seen |= cluster.keys()
-        distances, last = _farthest(neighbours, end)
-        found.append((distances[last] + 1, sum(len(neighbours[one]) for one in cluster) // 2))
+        cluster = _by_distance(neighbours, start, seen)
+        last = _by_distance(neighbours, cluster[-1], distance)[-1]
+        found.append((distance[last] + 1, sum(len(neighbours[one]) for one in cluster) // 2))
     return found
 
 
-def _farthest(neighbours: list[list[int]], start: int) -> tuple[dict[int, int], int]:
-    """Return the number of contacts from one bottle to each of its cluster, and a farthest bottle."""
-    distance, waiting, last = {start: 0}, deque([start]), start
-    while waiting:
-        last = waiting.popleft()
-        for other in neighbours[last]:
-            if other not in distance:
-                distance[other] = distance[last] + 1
-                waiting.append(other)
-    return distance, last
+def _by_distance(neighbours: list[list[int]], start: int, distance: list[int]) -> list[int]:
+    """Return the bottles of a cluster, those with few contacts from one bottle to them first. Note these numbers."""
+    reached = [start]
+    distance[start] = 0
+    for one in reached:  # the list grows
+        for other in neighbours[one]:
+            if distance[other] < 0:
+                distance[other] = distance[one] + 1
+                reached.append(other)
+    return reached

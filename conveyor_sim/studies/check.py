@@ -16,6 +16,7 @@ from conveyor_sim.scene.words import field_names, shown, unit_of
 from conveyor_sim.scene.yaml_lines import Document
 from conveyor_sim.simulation import Simulation
 from conveyor_sim.studies.design import Point, points_of
+from conveyor_sim.studies.gauges import Gauge
 from conveyor_sim.studies.line_of import controller_of, scene_of, steps_of
 from conveyor_sim.studies.parameter import Parameter
 from conveyor_sim.studies.setup import Setup
@@ -42,20 +43,26 @@ def _refused(setup: Setup, problems: list[Problem]) -> StudyError:
     return StudyError(str(refused(problems, places.place_of, setup.path)))
 
 
-def units_of(setup: Setup, scene: Scene) -> dict[str, str]:
-    """Return the unit of each metric. scene: of any run. Raise StudyError for a metric that the line doesn't have."""
-    simulation = Simulation(scene, threads=1)
-    units, problems = {}, []
+def gauges_of(setup: Setup, simulation: Simulation) -> dict[str, Gauge]:
+    """Return a gauge for each metric, from the present tick on.
+
+    Raise StudyError with a line for each metric of a device, machine or tag that the line doesn't have.
+    """
+    gauges, problems = {}, []
     for name, metric in setup.kept.items():
         try:
-            gauge = metric.make(simulation)
+            gauges[name] = metric.make(simulation)
         except StudyError as error:
             problems.append(Problem(("metrics", name), str(error)))
-            continue
-        units[name] = metric.unit or str(getattr(gauge, "unit", "1"))
     if problems:
         raise _refused(setup, problems)
-    return units
+    return gauges
+
+
+def units_of(setup: Setup, simulation: Simulation) -> dict[str, str]:
+    """Return the unit of each metric. simulation: of any run. Raise StudyError as `gauges_of`."""
+    gauges = gauges_of(setup, simulation)
+    return {name: metric.unit or str(getattr(gauges[name], "unit", "1")) for name, metric in setup.kept.items()}
 
 
 def parameter_units(setup: Setup, scene: Scene) -> dict[str, str]:

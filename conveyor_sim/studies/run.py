@@ -6,7 +6,7 @@ from __future__ import annotations
 import shutil
 import time
 import uuid
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -25,7 +25,8 @@ from conveyor_sim.scene import Scene, parse_overrides
 from conveyor_sim.scene.recorded import sources_of
 from conveyor_sim.scene.words import listed
 from conveyor_sim.simulation import Simulation
-from conveyor_sim.studies.gauges import Averaged, Gauge, half_width
+from conveyor_sim.studies.check import gauges_of
+from conveyor_sim.studies.gauges import Averaged, half_width
 from conveyor_sim.studies.line_of import controller_of, scene_of
 from conveyor_sim.studies.row import BAGS, Job, RunRow, Status
 from conveyor_sim.studies.setup import Setup
@@ -112,6 +113,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> RunRo
     scene = scene_of(work.setup, job.parameters, job.seed)
     controller = controller_of(work.setup, job.parameters)
     simulation = begun(scene, work.start)
+    gauges_of(work.setup, simulation)  # an unknown name ends the run here, before its warm-up
     with nullcontext() if clock is None else clock.standing():
         load_kernels(simulation)
     keep_start = None if work.start is None else simulation.save
@@ -134,7 +136,7 @@ def simulate(work: Work, bag: Path | None, clock: _Clock | None = None) -> RunRo
                 make_tick(simulation, scans, outputs)
             if simulation.tick:
                 reset_counters(simulation)
-            gauges = _gauges(work.setup, simulation)
+            gauges = gauges_of(work.setup, simulation)
             while simulation.tick < last:
                 make_tick(simulation, scans, outputs)
                 for gauge in gauges.values():
@@ -183,16 +185,6 @@ def reset_counters(simulation: Simulation) -> None:
     """Have all counters of a line begin anew with the next tick."""
     if simulation.line.counters() is not None:
         simulation.give(Input(STUDY, STUDY, "test", "reset_counters", (), ()))
-
-
-def _gauges(setup: Setup, simulation: Simulation) -> Mapping[str, Gauge]:
-    gauges: dict[str, Gauge] = {}
-    for name, metric in setup.kept.items():
-        try:
-            gauges[name] = metric.make(simulation)
-        except StudyError as error:
-            raise StudyError(f"metrics.{name}: {error}") from None
-    return gauges
 
 
 _LOADED: set[tuple[str, ...]] = set()

@@ -16,6 +16,7 @@ from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.physics.model import build_model
 from conveyor_sim.run.compilation import Compilation
 from conveyor_sim.run.scan_loop import ScanLoop
+from conveyor_sim.simulation import Simulation
 from conveyor_sim.statistics.warm_up import warm_up
 from conveyor_sim.studies.check import parameter_units, units_of
 from conveyor_sim.studies.journal import Journal
@@ -249,12 +250,16 @@ class Runs(AbstractContextManager["Runs"]):
                 kind = kernels_of(build_model(scene))
                 if kind in kinds:
                     continue
+                simulation = None if kinds else Simulation(scene, threads=1)
+            except Exception:  # the row of the run reports it
+                continue
+            if simulation is not None:
+                units = units_of(self._setup, simulation)
+                of_parameters = parameter_units(self._setup, scene)
+            try:
                 Compilation(scene, self._say).run()
             except Exception:  # the row of the run reports it
                 continue
-            if not kinds:
-                units = units_of(self._setup, scene)
-                of_parameters = parameter_units(self._setup, scene)
             kinds.add(kind)
         self.journal.keep_units(units, of_parameters)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from conveyor_sim.bag.messages.cdr import CODES, packer
+from conveyor_sim.bag.messages.cdr import CODES, behind_tick, packer
 from conveyor_sim.bag.messages.topics import TOPICS
 from conveyor_sim.bag.messages.typestore import typestore
 
@@ -55,6 +55,19 @@ def test_every_message_has_the_bytes_that_rosbags_makes(type_name: str) -> None:
         header = head(stamp=time(*divmod(stamp, 10**9)), frame_id=frame)
         expected = store.serialize_cdr(store.types[type_name](header=header, tick=tick, **values), type_name)
         assert packer(type_name).pack(frame, stamp, tick, values.__getitem__) == bytes(expected)
+
+
+@pytest.mark.parametrize("frame", TEXTS)
+def test_messages_of_other_ticks_share_the_bytes_behind_the_tick(frame: str) -> None:
+    pack = packer("conveyor_msgs/msg/Belts").pack
+    first, same, other = (
+        pack(frame, 10**9 * tick + 1, tick, {"commanded": [speed], "actual": [speed]}.__getitem__)
+        for tick, speed in ((1, 0.5), (7, 0.5), (7, 0.25))
+    )
+    assert first != same and behind_tick(first) == behind_tick(same) != behind_tick(other)
+    assert first.endswith(behind_tick(first)) and len(behind_tick(first)) >= 16
+    for unknown in (b"\x00\x00" + first[2:], first[:20], first[:7]):  # big endian; cut short
+        assert behind_tick(unknown) == unknown
 
 
 def test_arrays_of_other_types_are_brought_to_the_field_and_strided_ones_are_packed_in_order() -> None:

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 from worlds import callable_part
 
-from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
-from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams
+from conveyor_sim.engine.arrays.beams import BottleMotion
+from conveyor_sim.engine.sensors.beams import BLOCKED, CHANGES, CHORDS, FREE, block_beams, light_beams
 from conveyor_sim.engine.sensors.beams import cubic as cubic_part
 from conveyor_sim.engine.sensors.beams import within_reach as within_reach_part
 
@@ -66,11 +66,8 @@ ENDS = np.array([[[-0.1, 0.0], [0.1, 0.02]], [[0.05, -0.1], [0.05, 0.1]], [[0.19
 
 def blocked(start: F8, end: F8, radius: F8, ids: NDArray[np.int64], room: int) -> tuple[list[F8], list[int]]:
     """Return spans and state of each beam; start, end: x, y, vx, vy by slot."""
-    low, high, way = ENDS.min(axis=1), ENDS.max(axis=1), ENDS[:, 1] - ENDS[:, 0]
-    length = np.hypot(*way.T)[:, None]
-    line = np.hstack((ENDS[:, 0], low, high, way / length, length))
-    near, spans = np.empty((2, room), np.int64), np.empty((len(ENDS), room, 2))
-    beams = LightBeams(line, near, spans, np.empty(len(ENDS), np.int64), np.empty(len(ENDS), np.int64))
+    ends = [((begin[0], begin[1]), (end[0], end[1])) for begin, end in ENDS.tolist()]
+    beams = light_beams(ends)._replace(near=np.empty((2, room), np.int64), spans=np.empty((len(ENDS), room, 2)))
     while short := block_beams(BottleMotion(start, *end, radius, ids), LENGTH, beams):
         if short == 1:
             beams = beams._replace(near=np.empty((2, 2 * beams.near.shape[1]), np.int64))
@@ -86,7 +83,7 @@ def test_a_beam_is_blocked_while_any_way_is_within_reach_of_it() -> None:
     shares = np.linspace(0.0, 1.0, 401)[:, None]
     for _ in range(150):
         x0, y0 = rng.uniform(-0.2, 0.2, (2, slots))
-        vx0, vy0 = rng.uniform(-15.0, 15.0, (2, slots))
+        vx0, vy0 = rng.uniform(-25.0, 25.0, (2, slots))
         vx0[:4], vy0[:4] = 0.0, 0.0
         vx, vy = vx0 + rng.uniform(-0.1, 0.1, slots) * (vx0 != 0.0), vy0.copy()
         x, y = x0 + 0.5 * LENGTH * (vx0 + vx), y0 + LENGTH * vy0

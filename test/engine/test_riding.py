@@ -128,7 +128,7 @@ def test_who_is_as_fast_as_its_belt_rides_until_something_comes() -> None:
 
 @pytest.mark.parametrize(
     ("integrator", "solver"),
-    [("leapfrog", "explicit"), ("semi_implicit_euler", "explicit"), ("velocity_verlet", "implicit")],
+    [("leapfrog", "explicit"), ("velocity_verlet", "implicit")],
 )
 def test_a_whole_line_is_the_same_to_the_bit(integrator: str, solver: str) -> None:
     """Bottles come and go, pass to a slower belt, queue at a stop, and meet a gate.

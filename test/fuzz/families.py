@@ -170,8 +170,9 @@ _PLAIN = Family(
     outfeeds=True,
 )
 
+_IMPULSES = replace(_PLAIN, integrator="impulses", damping=("normal",), drives=True, alike=True)
+
 CI_FAMILIES = (
-    _PLAIN,
     replace(_PLAIN, drives=True, machines=True, sensors=True, axes=True, panel=True),
     Family(
         types=2,
@@ -185,6 +186,7 @@ CI_FAMILIES = (
         alike=True,
     ),
     Family(rails=("segment", "arc"), wheels=True, alike=True, panel=True, infeeds=True, ledger=True),
-    replace(_PLAIN, integrator="impulses", damping=("normal",), drives=True, movers=True, alike=True),
+    replace(_IMPULSES, movers=True),
+    replace(_IMPULSES, wheels=True, ledger=True),
 )
 """Few mixtures of effects, so that CI compiles few kernels: devices call for none but rails that move."""

@@ -72,11 +72,11 @@ def test_a_line_is_shown_and_worked_and_all_is_on_record(
     assert report.difference is None and report.compared["outcomes"] >= 3
 
 
-def test_a_node_may_hang_and_die_and_come_back(
+def test_a_node_may_hang_and_die_and_come_back_and_another_line_is_not_taken_for_it(
     start_node: Callable[..., Child], client: LineClient, source: NodeSource
 ) -> None:
-    given = {"scene": ZONED, "real_time_factor": 1.0, "start_paused": False, "duration": 600.0}
-    node = start_node(**given)
+    given = {"real_time_factor": 1.0, "start_paused": False, "duration": 600.0}
+    node = start_node(scene=ZONED, **given)
     until(lambda: not source.snapshot.lost, "the line")
     with halted(node):
         until(lambda: source.snapshot.lost, "silence")
@@ -85,26 +85,15 @@ def test_a_node_may_hang_and_die_and_come_back(
     run = source.snapshot.run_id
     os.kill(node.pid, signal.SIGKILL)
     until(lambda: source.snapshot.lost, "its death")
-    another = start_node(**given)
-    until(lambda: not source.snapshot.lost and source.snapshot.run_id != run, "another one")
+    other = start_node(**given)
+    until(lambda: not missing(source.snapshot.lost, "small_line", "expected zoned_line"), "the other line")
+    other.stop()
+    again = start_node(scene=ZONED, **given)
+    until(lambda: not source.snapshot.lost and source.snapshot.run_id != run, "another node of the line")
     assert source.give(setpoint(0.25)) == ""
     until(lambda: source.snapshot.values[SPEED] == 0.25, "the speed")
-    another.stop()
-
-
-def test_another_line_is_not_taken_for_this_one(
-    start_node: Callable[..., Child], client: LineClient, source: NodeSource
-) -> None:
-    first = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: not source.snapshot.lost, "the line")
-    first.stop()
+    again.stop()
     until(lambda: source.snapshot.lost, "its end")
-    second = start_node(real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: not missing(source.snapshot.lost, "small_line", "expected zoned_line"), "the other line")
-    second.stop()
-    third = start_node(scene=ZONED, real_time_factor=1.0, start_paused=False, duration=600.0)
-    until(lambda: not source.snapshot.lost, "the line")
-    third.stop()
 
 
 def test_a_node_with_other_messages_is_named(client: LineClient) -> None:

@@ -8,13 +8,17 @@ from typing import Any
 
 import pytest
 from facts import stating
-from studies.small import setup_of, write_study
+from studies.small import Here, setup_of, write_study
 
-from conveyor_sim.errors import StudyError
+from conveyor_sim.errors import ConveyorError, StudyError
 from conveyor_sim.scene.part import part_from
 from conveyor_sim.studies.check import check_study
 from conveyor_sim.studies.load import load_study
 from conveyor_sim.studies.parameter import Parameter
+from conveyor_sim.studies.row import Job
+from conveyor_sim.studies.run import run_alone
+from conveyor_sim.studies.runs import Runs
+from conveyor_sim.studies.sweep import sweep
 
 UNTIL = {"metric": "stops", "half_width": 1.0}
 RATE = {"argument": "rate", "values": [4.0]}
@@ -122,6 +126,31 @@ def test_a_line_that_cannot_be(tmp_path: Path, changes: dict[str, Any], said: st
     setup = setup_of(tmp_path, **changes)
     with pytest.raises(StudyError, match=said):
         check_study(setup)
+
+
+@pytest.mark.parametrize(
+    ("metric", "said"),
+    [
+        (
+            "throughput machines/thrid",
+            r'"machines/thrid" given as a device, expected one of machines/first, machines/sec',
+        ),
+        ("stops machines/thrid", r'"machines/thrid" given as a machine, expected machines/first, machines/second'),
+        ("mean belts/conveyor/sped", r'"belts/conveyor/sped" given as a tag, expected a signal'),
+    ],
+)
+def test_a_metric_of_an_unknown_device_is_refused_before_the_first_run(tmp_path: Path, metric: str, said: str) -> None:
+    """By a sweep before it makes a run, and by a single run before its first scan, which would raise."""
+    worn = {"controller": "code.py:Feeder", "settings": {"speed": 0.5, "until": 0.0}}
+    setup, engine = setup_of(tmp_path, metrics=[{"flow": metric}], warm_up=0.5, **worn), Here()
+    problem = r"study.yaml:\d+: metrics.flow: " + said
+    with Runs(setup, tmp_path / "out", engine) as runs, pytest.raises(StudyError, match=problem):
+        sweep(runs, setup)
+    assert engine.made == 0
+    with pytest.raises(StudyError, match=problem):
+        run_alone(setup, Job(0, {"rate": 4.0}, 1), None)
+    with pytest.raises(ConveyorError, match="worn out"):
+        run_alone(setup_of(tmp_path, **worn), Job(0, {"rate": 4.0}, 1), None)
 
 
 @pytest.mark.parametrize("value", [".nan", "-.inf"])

@@ -29,6 +29,7 @@ _NS = 1_000_000_000
 _ZEROS = [bytes(count) for count in range(8)]
 _COUNT = struct.Struct("<I")
 _STAMP = struct.Struct("<iI")
+_TICK = struct.Struct("<Q")
 _TEXT = 12
 """Byte at which a header's frame_id begins, with its length: behind the encapsulation and the stamp."""
 
@@ -177,10 +178,26 @@ def tick_of(data: bytes) -> int:
 
     Raises struct.error if the message is cut short.
     """
-    (length,) = struct.unpack_from("<I", data, _TEXT)
-    behind = _TEXT + 4 + length - len(HEADER)
-    (tick,) = struct.unpack_from("<Q", data, len(HEADER) + behind + -behind % 8)
+    (tick,) = _TICK.unpack_from(data, _tick_place(data))
     return int(tick)
+
+
+def behind_tick(data: bytes) -> bytes:
+    """Return the bytes behind the tick of a message of conveyor_msgs. Messages that repeat a content share them.
+
+    A message that this package can't have written is returned as it is.
+    """
+    if data[: len(HEADER)] != HEADER or len(data) < _TEXT + _COUNT.size:
+        return data
+    place = _tick_place(data) + _TICK.size
+    return data[place:] if place <= len(data) else data
+
+
+def _tick_place(data: bytes) -> int:
+    """Return the byte at which the tick of a message begins."""
+    (length,) = _COUNT.unpack_from(data, _TEXT)
+    behind = _TEXT + 4 + int(length) - len(HEADER)
+    return len(HEADER) + behind + -behind % 8
 
 
 def pose_rows(x: NDArray[np.float64], y: NDArray[np.float64], theta: NDArray[np.float64]) -> NDArray[np.float64]:

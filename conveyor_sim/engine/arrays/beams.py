@@ -3,6 +3,7 @@
 
 from typing import NamedTuple
 
+from conveyor_sim.engine.arrays.lists import StaticGrid
 from conveyor_sim.engine.arrays.types import F8, I8
 from conveyor_sim.engine.compiler.groups import group
 
@@ -28,6 +29,8 @@ class LightBeams(NamedTuple):
 
     line: F8
     """Start, lower corner, upper corner, direction (m) and length (m) of each beam, (B, 9)."""
+    grid: StaticGrid
+    """Cells with the beams within `sensors.beams.REACH` of a point in them, as bodies."""
     near: I8
     """Scratch, (2, n)."""
     spans: F8

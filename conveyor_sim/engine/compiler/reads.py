@@ -7,7 +7,7 @@ doubt a member counts as read. If one were missed, numba would report an error w
 
 import ast
 import inspect
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -38,8 +38,20 @@ def _functions(source: str, is_text: bool) -> Mapping[tuple[str, int], ast.Funct
     if not is_text:
         with open(source, encoding="utf-8") as file:
             source = file.read()
-    nodes = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.FunctionDef))
+    nodes = (node for node in _statements(ast.parse(source).body) if isinstance(node, ast.FunctionDef))
     return {(node.name, min([node.lineno, *(one.lineno for one in node.decorator_list)])): node for node in nodes}
+
+
+def _statements(body: Sequence[ast.stmt]) -> Iterator[ast.stmt]:
+    """Yield statements and those inside them. Expressions hold no statements, and most nodes lie in expressions."""
+    for statement in body:
+        yield statement
+        for block in _BLOCKS:
+            yield from _statements(getattr(statement, block, ()))
+
+
+_BLOCKS = ("body", "orelse", "finalbody")
+"""Fields of statements that are lists of statements."""
 
 
 class _Reading:
@@ -51,9 +63,12 @@ class _Reading:
         self._read: set[Path] = set()
         before = -1
         # Repeat, because a loop may use names that its end assigns.
+        loops = any(isinstance(inner, ast.For | ast.While) for inner in _statements(node.body))
         while before < (before := len(self._read) + sum(map(len, self._places.values()))):
             for statement in node.body:
                 self._statement(statement)
+            if not loops:
+                break
         self.by_argument = [frozenset(path[1:] for path in self._read if path[0] == name) for name in arguments]
 
     def _statement(self, node: ast.stmt) -> None:

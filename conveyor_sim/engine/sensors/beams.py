@@ -6,12 +6,14 @@ chords of equal duration. Bottles come and go between ticks only, so each slot h
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
-from conveyor_sim.engine.arrays.types import F8, I8
+from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.lists.static_grid import build_static_grid, cell_at
 
 CHORDS = 8
 """Chords per path. At 1 g in a tick of 10 ms they deviate from it by 2 micrometres."""
@@ -22,8 +24,31 @@ STILL = 1e-13
 ROUNDING = 1e-9
 """Shorter intervals are ignored, s."""
 
+REACH, CELL = 0.25, 0.5
+"""Distance from its axis at which a bottle finds a beam in the grid, and edge of the cells, m. Faster bottles, whose
+paths reach farther, are compared with all beams."""
+
 FREE, BLOCKED, CHANGES = 0, 1, 2
 """State of a beam in a tick: free throughout, blocked throughout, or neither."""
+
+
+Ends = tuple[tuple[float, float], tuple[float, float]]
+"""Both ends of a beam, m."""
+
+
+def light_beams(ends: Sequence[Ends]) -> LightBeams:
+    """Return beams between these ends."""
+    start, end = np.array(ends, dtype=np.float64).swapaxes(0, 1)
+    length = np.hypot(*(end - start).T)[:, None]
+    boxes, none = np.hstack((np.minimum(start, end), np.maximum(start, end))), np.empty((0, 4))
+    return LightBeams(
+        line=np.hstack((start, boxes, (end - start) / length, length)),
+        grid=build_static_grid(none, none, none, boxes, REACH + STILL, 0.0, CELL),
+        near=np.empty((2, 16), dtype=np.int64),
+        spans=np.empty((len(ends), 16, 2)),
+        used=np.zeros(len(ends), dtype=np.int64),
+        state=np.zeros(len(ends), dtype=np.int64),
+    )
 
 
 @kernel
@@ -33,7 +58,7 @@ def block_beams(motion: BottleMotion, length: float, beams: LightBeams) -> int:
     Return which array is too small: 0 none, 1 near, 2 spans.
     """
     count, state, spans, near = beams.used, beams.state, beams.spans, beams.near
-    pairs = _near(motion, length / 3.0, beams.line, near)
+    pairs = _near(motion, length / 3.0, beams)
     if pairs < 0:
         return 1
     for beam in range(count.size):
@@ -61,9 +86,10 @@ def block_beams(motion: BottleMotion, length: float, beams: LightBeams) -> int:
 
 
 @part
-def _near(motion: BottleMotion, third: float, line: F8, near: I8) -> int:
+def _near(motion: BottleMotion, third: float, beams: LightBeams) -> int:
     """Write pairs of a beam and a slot whose path may come within reach. Return their number, -1 if they don't fit."""
     start, x, y, radius = motion.start, motion.x, motion.y, motion.radius
+    line, grid, near = beams.line, beams.grid, beams.near
     pairs = 0
     for i in range(x.size):
         if motion.id[i] < 0:
@@ -75,7 +101,15 @@ def _near(motion: BottleMotion, third: float, line: F8, near: I8) -> int:
         ahead, behind = start[1, i] + third * start[3, i], y[i] - third * motion.vy[i]
         low_y = min(min(start[1, i], ahead), min(behind, y[i])) - radius[i]
         high_y = max(max(start[1, i], ahead), max(behind, y[i])) + radius[i]
-        for beam in range(line.shape[0]):
+        listed = max(max(high_x - x[i], x[i] - low_x), max(high_y - y[i], y[i] - low_y)) <= REACH
+        first, end = 0, line.shape[0]
+        if listed:
+            home = cell_at(grid, x[i], y[i])
+            if home < 0:
+                continue
+            first, end = grid.body_start[home], grid.body_start[home + 1]
+        for entry in range(first, end):
+            beam = grid.body[entry] if listed else entry
             if high_x >= line[beam, 2] and low_x <= line[beam, 4] and high_y >= line[beam, 3]:
                 if low_y <= line[beam, 5]:
                     if pairs == near.shape[1]:

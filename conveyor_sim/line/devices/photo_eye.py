@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from conveyor_sim.engine.arrays.beams import BottleMotion, LightBeams
+from conveyor_sim.engine.arrays.beams import BottleMotion
 from conveyor_sim.engine.arrays.bodies import Bottles
 from conveyor_sim.engine.compiler.numba_internals.machine_code import entry
-from conveyor_sim.engine.sensors.beams import BLOCKED, FREE, ROUNDING, block_beams
+from conveyor_sim.engine.sensors.beams import BLOCKED, FREE, ROUNDING, block_beams, light_beams
 from conveyor_sim.line.device import Device, ScanContext
 from conveyor_sim.line.devices.setup import CHATTER, DeviceSetup
 from conveyor_sim.line.tag import count, number, seconds, switch
@@ -32,16 +32,7 @@ class Beams(Device):
         ends: both ends of each beam, m.
         """
         super().__init__("beams")
-        start, end = np.array(ends, dtype=np.float64).swapaxes(0, 1)
-        length = np.hypot(*(end - start).T)[:, None]
-        corners = np.minimum(start, end), np.maximum(start, end)
-        self._beams = LightBeams(
-            line=np.hstack((start, *corners, (end - start) / length, length)),
-            near=np.empty((2, 16), dtype=np.int64),
-            spans=np.empty((len(ends), 16, 2)),
-            used=np.zeros(len(ends), dtype=np.int64),
-            state=np.zeros(len(ends), dtype=np.int64),
-        )
+        self._beams = light_beams(ends)
         self._eyes: list[PhotoEyeDevice] = []
         self._steady: list[int] = []
         self._bottles: Bottles | None = None

@@ -43,9 +43,9 @@ class State:
         self._removed: list[int] = []
         self.held: dict[int, Held] = {}
         """Bottles held by machines, by id. They are not on the line."""
-        # Machine code of `rebuild` and `fill_column`: the types of their arguments never change in a State.
+        # Machine code of `rebuild`, whose types never change in a State, and of `fill_column` by types of its arrays.
         self._rebuild_entry: Any = None
-        self._fill: Any = None
+        self._fill: dict[tuple[np.dtype[Any], np.dtype[Any]], Any] = {}
         self.moves = 0
         """Number of changes of positions: by ticks, by bottles that were added, and by edits."""
 
@@ -312,8 +312,10 @@ class State:
             for column, table in zip(pairs.law, tables, strict=True):
                 if column is not None:
                     arguments = column, table, pairs.i, pairs.j, pairs.used, self.world.bottles.type
-                    self._fill = self._fill or entry(fill_column, *arguments)
-                    self._fill(*arguments)
+                    kinds = column.dtype, table.dtype
+                    if kinds not in self._fill:
+                        self._fill[kinds] = entry(fill_column, *arguments)
+                    self._fill[kinds](*arguments)
 
     def _resize(self, slots: int) -> None:
         """Make room for more bottles. Lists stay as they are, because tangential springs belong to their entries."""

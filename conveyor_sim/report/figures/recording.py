@@ -247,7 +247,8 @@ class Recording:
         on_belt: list[Integers] = []
         entered: list[list[int]] = []
         forces: list[tuple[float, float, int]] = []
-        seen = np.empty(0, dtype=np.int64)
+        before = np.empty(0, dtype=np.int64)
+        new: list[Integers] = []
         itinerary = Itinerary(len(self.belts), self._initial)
         present: list[int] = []
         counter = BottleCounter("events" in self._bag.counts)
@@ -255,7 +256,8 @@ class Recording:
             counter.take_events(events.data)
         for frame in self._bag.bottles():
             ids, belt = frame.data.id.astype(np.int64), frame.data.belt.astype(np.int64)
-            seen = np.union1d(seen, ids)
+            new.append(np.setdiff1d(ids, before, assume_unique=True))
+            before = ids
             ticks.append(frame.tick)
             present.append(len(ids))
             counter.take_bottles(frame.data.id)
@@ -274,7 +276,7 @@ class Recording:
         )
         force = np.array(forces, dtype=np.float64)
         peak = PeakForceSeries(time, force[:, 0], force[:, 1], force[:, 2].astype(np.int64))
-        return _Summary(tick_array, seen, flow, peak)
+        return _Summary(tick_array, np.unique(np.concatenate(new)), flow, peak)
 
 
 def _columns(counts: Sequence[BottleCounts]) -> dict[str, Integers | None]:

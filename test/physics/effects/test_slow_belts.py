@@ -164,8 +164,7 @@ def test_commands_print_the_warning(tmp_path: Any) -> None:
         ["check", *drawn],
         ["check", "--details", *drawn],
         ["explain"],
-        ["run", "--no-record"],
-        ["run", *bag],
+        ["run", "--no-pictures", *bag],
     ):
         command, *options = arguments
         result = CliRunner().invoke(main, [command, str(file), *options])

@@ -87,7 +87,7 @@ def test_check_explain_and_run_show_the_warning(tmp_path: Path) -> None:
     # Effects of the checkpoint tests, for the kernels.
     file.write_text(queue(**SPRINGS_AND_RINGS, duration=0.02).source_text)
     drawn, bag = ["--out", str(tmp_path)], ["--out", str(tmp_path / "bag")]
-    for command, *options in (["check", *drawn], ["explain"], ["run", "--no-record"], ["run", *bag]):
+    for command, *options in (["check", *drawn], ["explain"], ["run", "--no-pictures", *bag]):
         result = CliRunner().invoke(main, [command, str(file), *options])
         assert result.exit_code == 0, result.output
         facts = ["warning", "contacts[1].tangential", "left", "too small", "docs/validation.md"]
