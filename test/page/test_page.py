@@ -263,7 +263,11 @@ def test_a_stop_by_command_during_a_failure_states_the_command(
     with opened_page(browser, write_page(tmp_path / "bag", tmp_path / "page.html")) as page:
         page.click("#tab_events")
         press(page, "End")
-        states = [text for text in page.locator("#panel_events .event").all_inner_texts() if "machine state machines/capper " in " ".join(text.split())]
+        states = [
+            text
+            for text in page.locator("#panel_events .event").all_inner_texts()
+            if "machine state machines/capper " in " ".join(text.split())
+        ]
         assert "capper Held, failure jam" in states[-2]
         assert f"capper Stopped, {reason}" in states[-1]
 
