@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The line that the page is tested with, and a recording of it in which things happen."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from conveyor_sim.bag.outputs import OutputWriter
@@ -11,8 +12,17 @@ from conveyor_sim.simulation import Simulation
 LINE = Path(__file__).parent / "line.yaml"
 
 
-def record(folder: Path, seconds: float = 24.0, closes: bool = True, line: Path = LINE) -> Path:
-    """The line with a fault, a refused command, and a gate that closes at 6 s, if it does, and opens."""
+def record(
+    folder: Path,
+    seconds: float = 24.0,
+    closes: bool = True,
+    line: Path = LINE,
+    commands: Sequence[tuple[int, str, float]] = (),
+) -> Path:
+    """The line with a fault, a refused command, and a gate that closes at 6 s, if it does, and opens.
+
+    commands: ticks, names and values of further commands.
+    """
     scene = load_scene(line)
     simulation = Simulation(scene)
     with Recorder(folder) as recorder:
@@ -29,6 +39,9 @@ def record(folder: Path, seconds: float = 24.0, closes: bool = True, line: Path 
                 simulation.command(["belts/line/cmd_speed"], [7.0], "test")
             if tick == 1000:
                 simulation.command(["belts/line/cmd_speed"], [0.3], "test")
+            for at, name, value in commands:
+                if tick == at:
+                    simulation.command([name], [value], "test")
             simulation.advance()
             outputs.after_tick()
     return folder

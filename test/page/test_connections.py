@@ -8,6 +8,7 @@ import json
 import os
 import signal
 import socket
+import threading
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import AsyncExitStack, ExitStack, contextmanager, suppress
@@ -311,6 +312,30 @@ def test_who_shows_no_frames_gets_no_more_and_all_that_happened(live: Live) -> N
 
     drawn, happened = run(work())
     assert drawn == UNSEEN and happened >= 1
+
+
+def test_others_are_answered_while_the_first_page_is_prepared(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The drawing below a line can take a second to read."""
+    begun, answered = threading.Event(), threading.Event()
+    really_head = feed.head
+
+    def slow(line: Any, scene: Any) -> Any:
+        begun.set()
+        assert answered.wait(PATIENCE), "no answer while the page is prepared"
+        return really_head(line, scene)
+
+    monkeypatch.setattr(feed, "head", slow)
+
+    async def work(url: str) -> None:
+        async with ClientSession() as session, session.ws_connect(f"{url}/live", origin=url) as page:
+            await asyncio.to_thread(begun.wait, PATIENCE)
+            async with session.get(url) as answer:
+                assert answer.status == 200
+            answered.set()
+            await next_text(page, "begin")
+
+    with served_here(live.source) as here:
+        run(work(here.address.rstrip("/")))
 
 
 def test_a_picture_is_packed_once_however_many_look(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -251,6 +251,27 @@ def test_a_second_failure_of_one_kind_states_its_reason(browser: Any, tmp_path: 
             assert " ".join(reason.inner_text().split()) == f"stop_reason {note} failure jam".replace("  ", " ")
 
 
+@pytest.mark.parametrize(
+    ("command", "value", "reason"), [("run", 0.0, "command run"), ("cntrl_cmd", 3.0, "command Stop")]
+)
+def test_a_stop_by_command_during_a_failure_states_the_command(
+    browser: Any, tmp_path: Path, command: str, value: float, reason: str
+) -> None:
+    line = tmp_path / "line.yaml"
+    line.write_text(LINE.read_text().replace("times: [12.0, 1000.0]", "times: [1.0, 1000.0]"))
+    record(tmp_path / "bag", 7.0, line=line, commands=[(650, f"machines/capper/{command}", value)])
+    with opened_page(browser, write_page(tmp_path / "bag", tmp_path / "page.html")) as page:
+        page.click("#tab_events")
+        press(page, "End")
+        states = [
+            text
+            for text in page.locator("#panel_events .event").all_inner_texts()
+            if "machine state machines/capper " in " ".join(text.split())
+        ]
+        assert "capper Held, failure jam" in states[-2]
+        assert f"capper Stopped, {reason}" in states[-1]
+
+
 def test_a_faceplate_shows_the_tags_of_the_device_that_is_clicked(page: Any) -> None:
     seek(page, 12.0)
     x, y = to_pixels(page, 1.5, 0.06)

@@ -18,7 +18,8 @@ export const isStanding = (state) => STANDS.has(state);
 const SHOWN = new Set([1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
 
 export const EXECUTE = 6;
-const HOLDING = 10, HELD = 11;
+const STOPPED = 2, STOPPING = 7, HOLDING = 10, HELD = 11;
+const STOP = 3; // value of cntrl_cmd
 const WAITS = new Set(["starved", "blocked"]);
 const OF_MACHINE = /^(.*)\/(\w+)$/;
 
@@ -130,10 +131,18 @@ export class Story {
     return value !== EXECUTE && reason && !WAITS.has(reason) ? `${text}, ${reason}` : text;
   }
 
-  // A failure with the reason of the one before it changes the state only, so that reason continues.
+  // A failure with the reason of the one before it changes the state only, so that reason continues. A failure stays the
+  // reason of a machine that is commanded to stop meanwhile.
   _reasonAt(device, time, state) {
     const { times, texts } = this.reasons.get(device) ?? { times: [], texts: [] }, last = lastUpTo(times, time);
-    return last >= 0 && (times[last] === time || state === HOLDING || state === HELD) ? texts[last] : "";
+    if (last >= 0 && (times[last] === time || state === HOLDING || state === HELD)) return texts[last];
+    return state === STOPPING || state === STOPPED ? this.commandedStop(device, time) : "";
+  }
+
+  // Returns the command in force by which a machine stops, as its stop reason; "": none.
+  commandedStop(device, time) {
+    const valueOf = (command) => this.readBackAt(this.head.commands.indexOf(`${device}/${command}`), time)?.value;
+    return valueOf("run") === 0 ? "command run" : valueOf("cntrl_cmd") === STOP ? "command Stop" : "";
   }
 
   // now: last state of each machine.

@@ -16,11 +16,10 @@ export class Tiles {
 
   // Returns the category of a machine that does not run, with its reason.
   _why(name, { category, stop_reason }) {
-    const { story, clock, recording: { head } } = this.view;
+    const { story, clock } = this.view;
     if ([category, "none"].includes(stop_reason)) return category;
     const isOver = category === "idle" && !stop_reason.startsWith("command"); // a failure stays the reason of a commanded stop
-    const isOff = isOver && story.readBackAt(head.commands.indexOf(`${name}/run`), clock.time)?.value === 0;
-    return `${category}: ${isOff ? "command run" : isOver ? `after ${stop_reason}` : stop_reason}`;
+    return `${category}: ${isOver ? story.commandedStop(name, clock.time) || `after ${stop_reason}` : stop_reason}`;
   }
 
   draw() {

@@ -238,6 +238,9 @@ class Feed:
             await self._changed.wait()
             self._changed.clear()
             try:
+                line = self._source.frame.line
+                if self._head[0] is not line:  # a thread, because importing the reader of an underlay takes a second
+                    self._head = line, await asyncio.to_thread(_head_of, line)
                 self._follow()
                 self._failure = ""
             except Exception as error:  # messages of a damaged recording or another version may have any content
@@ -270,9 +273,8 @@ class Feed:
     def _begin(self, viewer: Viewer) -> None:
         """Send the complete present state of the line to a page."""
         drawable, line = self._drawable, self._drawable.line
-        if self._head[0] is not line:
-            scene = parse_again(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
-            self._head = line, head(line, scene)
+        if self._head[0] is not line:  # the line has changed since it was looked at
+            self._head = line, _head_of(line)
         times = {
             "first": drawable.tick,
             "last": drawable.tick,
@@ -337,6 +339,12 @@ class Feed:
         if self._frame[0] != key:
             self._frame = key, _packed(self._drawable)
         return self._frame[1]
+
+
+def _head_of(line: Any) -> dict[str, Any]:
+    """Return the constant data of the page from a decoded Line message."""
+    scene = parse_again(line.scene_text, "the scene of the line", parse_overrides(line.overrides))
+    return head(line, scene)
 
 
 def _packed(drawable: DrawableFrame) -> bytes:

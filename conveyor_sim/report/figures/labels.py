@@ -68,9 +68,10 @@ def rail_labels(plant: StaticGeometry) -> list[Label]:
         leg = np.clip(np.searchsorted(reach, wanted) - 1, 0, len(line) - 2)
         ahead = line[leg + 1] - line[leg]
         left = np.stack([-ahead[:, 1], ahead[:, 0]], axis=1) / np.hypot(*ahead.T)[:, None]
-        labels.append(
-            Label(rail.name, style.MUTED, 7.5, np.concatenate([at, at]), np.concatenate([left, -left]), 0.2, far=False)
-        )
+        beyond = np.array([line[0] - line[1], line[-1] - line[-2]])  # beside a guide across a belt is the belt
+        beyond /= np.hypot(*beyond.T).clip(1e-12)[:, None]
+        anchors, outward = np.concatenate([at, at, line[[0, -1]]]), np.concatenate([left, -left, beyond])
+        labels.append(Label(rail.name, style.MUTED, 7.5, anchors, outward, 0.2, far=False))
     return labels
 
 

@@ -4,14 +4,19 @@
 from __future__ import annotations
 
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
+import pytest
 from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 
 from conveyor_sim.report.figures.data import StaticGeometry
 from conveyor_sim.report.figures.labels import belt_labels, mark_labels, place, rail_labels
 from conveyor_sim.report.figures.plant import draw_plant
+from conveyor_sim.scene import load_scene
+
+SCENE = Path(__file__).with_name("small_plant.yaml")
 
 
 def test_belts_carry_name_and_speed(plant: StaticGeometry) -> None:
@@ -54,6 +59,21 @@ def test_the_name_of_a_belt_is_not_written_on_another_belt(ax: Axes, plant: Stat
     for text in ax.texts:
         centre = text.get_position()
         assert not any(area.contains_point(centre) for area in areas)
+
+
+def test_the_name_of_a_guide_across_a_belt_is_beside_the_belt(ax: Axes, tmp_path: Path) -> None:
+    rails = "  across: {kind: segment, from: [-1.0, 0.42], to: [-1.0, 0.58], material: steel}\n"
+    scene = tmp_path / "scene.yaml"
+    scene.write_text(SCENE.read_text().replace("rails:\n", "rails:\n" + rails))
+    plant = StaticGeometry.of(load_scene(scene))
+    draw_plant(ax, plant, plant.speeds, Normalize(0.0, 1.0), 0.1)
+    ax.set_xlim(-3.5, 6.0)
+    ax.set_ylim(-2.0, 4.0)
+    place(ax, [label for label in rail_labels(plant) if label.text == "across"], plant)
+    (text,) = ax.texts
+    x, y = text.get_position()
+    assert x == pytest.approx(-1.0, abs=0.01)
+    assert not 0.4 < y < 0.6
 
 
 def test_in_a_crowd_names_are_joined_by_lines_or_left_out(ax: Axes, plant: StaticGeometry) -> None:
