@@ -186,6 +186,8 @@ def test_the_spring_goes_with_the_slip_and_no_further_than_it_can_hold() -> None
     assert spring_after(spring, 1, 1e-4, 0.002, 0.02, 1e-3, 0.0, 1.0) == 0.0
     assert spring_after(spring, 1, 1e-4, 0.002, 0.02, 1e-3, -3.0, 1.0) == 0.0
     assert spring_after(law(friction=MU, tangential_stiffness=0.0), 1, 1e-4, 0.002, 0.02, 1e-3, 10.0, 1.0) == 0.0
+    # Implicit friction at rails keeps a history for pairs, too, which may be without friction.
+    assert spring_after(law(stiffness=K), 1, 0.0, 0.002, 0.02, 1e-3, 10.0, 1.0) == 0.0
 
 
 MINDLIN = {"hertz": K_HERTZ, "friction": MU, "tangential_stiffness": 0.0, "tangential_mindlin": 1.2 * K_HERTZ}

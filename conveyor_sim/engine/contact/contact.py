@@ -234,6 +234,8 @@ def spring_after(
     overlap: m. normal: N, of the contact; 0, as without contact, resets the spring. The result is 0 for a pair without
     a spring (Cundall and Strack 1979).
     """
+    if law.friction is None:
+        return 0.0
     depth = 0.0 if overlap < 0.0 else overlap
     stiffness = _tangential_stiffness(law, e, depth)
     longer = spring + dt * slip
