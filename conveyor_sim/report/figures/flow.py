@@ -60,7 +60,7 @@ def flow_figure(flow: Flow, belts: Sequence[str]) -> Figure:
         for ax in axes[:-1].flat:
             _stand_above(ax, axes[-1, 0], marks)
         axes[0, 0].set_title("Bottles on each belt")
-        axes[0, 1].set_title(f"Bottles per minute onto each belt, over the last {window:g} s")
+        axes[0, 1].set_title(f"Bottles per minute onto each belt (over {window:g} s)")
     return figure
 
 
