@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -26,7 +26,7 @@ from conveyor_sim.accuracy.results import AccuracyStudy
 from conveyor_sim.accuracy.setting import Setting
 from conveyor_sim.accuracy.study import FIRST_RUNS, affordable, run_study, study_folder
 from conveyor_sim.errors import ConveyorError
-from conveyor_sim.scene import Scene, load_scene, parse_scene
+from conveyor_sim.scene import load_scene, parse_scene
 
 pytestmark = pytest.mark.usefixtures("brief_costs")
 
@@ -71,86 +71,36 @@ def without_times(study: AccuracyStudy) -> AccuracyStudy:
     return replace(study, cpu=None, samples=tuple(replace(sample, cpu=0.0) for sample in study.samples))
 
 
-@dataclass(frozen=True)
-class Begun:
-    """A folder with `scene.yaml`, and `killed`, the folder of a study with a budget that was spent at once."""
-
-    root: Path
-    short: AccuracyStudy
-    again: AccuracyStudy
-    """With the same budget once more."""
-
-    @property
-    def scene(self) -> Scene:
-        return load_scene(self.root / "scene.yaml")
-
-    @property
-    def folder(self) -> Path:
-        return self.root / "killed"
-
-
 @pytest.fixture(scope="module")
-def begun(tmp_path_factory: pytest.TempPathFactory, brief_costs: None) -> Begun:
+def interrupted(tmp_path_factory: pytest.TempPathFactory, brief_costs: None) -> Path:
+    """The folder of a study whose process was killed in the middle of its long runs, and beside it its scene."""
     root = tmp_path_factory.mktemp("study")
     (root / "scene.yaml").write_text(SCENE)
-    scene = load_scene(root / "scene.yaml")
-    short, again = (run_study(scene, root / "killed", 0.01, NO_TIME, silent) for _ in range(2))
-    return Begun(root, short, again)
-
-
-def test_a_budget_that_is_spent_leaves_settings_out_and_names_them(begun: Begun) -> None:
-    """The first settings are measured in any case; a small budget keeps them."""
-    short, scene = begun.short, begun.scene
-    predicted = forecast(scene, 0.01).point
-    assert predicted is not None
-    first = first_settings(scene, 0.01)
-    assert first[0] == predicted.setting
-    assert {point.setting for point in short.points} == set(first)
-    assert short.answer is not None
-    assert short.orders == ()
-    facts = ("not run", "budget", "--thorough")
-    assert any(all(fact in sentence for fact in facts) for sentence in short.skipped)
-    (left_out,) = [sentence for sentence in short.skipped if sentence.startswith("Not measured within the budget")]
-    assert "rk4" in left_out
-    assert begun.again.points == short.points
-
-
-@pytest.fixture(scope="module")
-def interrupted(begun: Begun) -> Begun:
-    """A study of a larger budget in the same folder, whose process was killed in the middle of its long runs."""
-    samples = begun.folder / SAMPLES
-    assert not samples.exists()
-    code = (
-        f"import test_study; test_study.main({str(begun.root / 'scene.yaml')!r}, {str(begun.folder)!r}, {timing.CHUNK})"
-    )
+    folder = root / "killed"
+    code = f"import test_study; test_study.main({str(root / 'scene.yaml')!r}, {str(folder)!r}, {timing.CHUNK})"
     child = subprocess.Popen([sys.executable, "-c", code], cwd=Path(__file__).parent)
-    while child.poll() is None and not samples.exists():
+    while child.poll() is None and not (folder / SAMPLES).exists():
         time.sleep(0.05)
-    while child.poll() is None and samples.read_bytes().count(b"\n") < 2:
+    while child.poll() is None and (folder / SAMPLES).read_bytes().count(b"\n") < 2:
         time.sleep(0.01)
     child.send_signal(signal.SIGKILL)
     assert child.wait() == -signal.SIGKILL, "the study ended before it could be killed"
-    return begun
+    return folder
 
 
-def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Begun) -> None:
-    """What was measured is not measured again, and finished runs stay; the rest is as if nothing had happened.
-
-    It measures what a small budget left out.
-    """
-    scene, folder, copy = interrupted.scene, interrupted.folder, interrupted.root / "from_measured"
+def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Path) -> None:
+    """What was measured is not measured again, and finished runs stay; the rest is as if nothing had happened."""
+    scene = load_scene(interrupted.parent / "scene.yaml")
+    copy = interrupted.with_name("from_measured")
     copy.mkdir()
     for name in (MEASURED, "origin.json"):
-        shutil.copy(folder / name, copy)
-    before = (folder / SAMPLES).read_bytes()
-    resumed = run_study(scene, folder, 0.01, ONE_RUN, silent)
+        shutil.copy(interrupted / name, copy)
+    before = (interrupted / SAMPLES).read_bytes()
+    resumed = run_study(scene, interrupted, 0.01, ONE_RUN, silent)
     whole = run_study(scene, copy, 0.01, ONE_RUN, silent)
-    assert (folder / SAMPLES).read_bytes().startswith(before[: before.rfind(b"\n") + 1])
+    assert (interrupted / SAMPLES).read_bytes().startswith(before[: before.rfind(b"\n") + 1])
     assert without_times(resumed) == without_times(whole)
-    assert read_study(folder / "study.json") == resumed
-    assert len(resumed.points) > len(interrupted.short.points)
-    assert resumed.orders
-    assert not any("within the budget" in sentence for sentence in resumed.skipped)
+    assert read_study(interrupted / "study.json") == resumed
 
     assert resumed.answer is not None
     assert resumed.answer.error <= 0.01
@@ -167,6 +117,29 @@ def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Begun) -> None:
     # Impact peaks go as the root of the stiffness.
     ratio = soft.observables["peak force, 99th percentile"][0] / stiff.observables["peak force, 99th percentile"][0]
     assert ratio == pytest.approx(0.5, rel=0.1)
+
+
+def test_a_budget_that_is_spent_leaves_settings_out_and_names_them(interrupted: Path, tmp_path: Path) -> None:
+    """The first settings are measured in any case; a larger budget measures the others, a small one keeps them."""
+    scene = load_scene(interrupted.parent / "scene.yaml")
+    short = run_study(scene, tmp_path, 0.01, NO_TIME, silent)
+    predicted = forecast(scene, 0.01).point
+    assert predicted is not None
+    first = first_settings(scene, 0.01)
+    assert first[0] == predicted.setting
+    assert {point.setting for point in short.points} == set(first)
+    assert short.answer is not None
+    assert short.orders == ()
+    facts = ("not run", "budget", "--thorough")
+    assert any(all(fact in sentence for fact in facts) for sentence in short.skipped)
+    (left_out,) = [sentence for sentence in short.skipped if sentence.startswith("Not measured within the budget")]
+    assert "rk4" in left_out
+    again = run_study(scene, tmp_path, 0.01, NO_TIME, silent)
+    assert again.points == short.points
+    whole = run_study(scene, tmp_path, 0.01, ONE_RUN, silent)
+    assert len(whole.points) > len(short.points)
+    assert whole.orders
+    assert not any("within the budget" in sentence for sentence in whole.skipped)
 
 
 def test_the_time_left_holds_from_phase_to_phase(tmp_path: Path) -> None:
@@ -214,24 +187,23 @@ def test_runs_that_do_not_fit_the_budget_are_not_begun() -> None:
     assert affordable([one], {one: 1.01 * FIRST_RUNS}, 0.0) == []
 
 
-def test_a_folder_of_another_scene_is_refused(interrupted: Begun, tmp_path: Path) -> None:
-    folder = interrupted.folder
+def test_a_folder_of_another_scene_is_refused(interrupted: Path, tmp_path: Path) -> None:
     other = tmp_path / "other.yaml"
     other.write_text(SCENE.replace("0.8, 0", "0.9, 0"))
-    before = {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()}
+    before = {file.name: file.read_bytes() for file in interrupted.iterdir() if file.is_file()}
     with pytest.raises(ConveyorError, match=r"origin\.json: .* another scene"):
-        run_study(load_scene(other), folder, 0.01, ONE_RUN, silent)
-    assert {file.name: file.read_bytes() for file in folder.iterdir() if file.is_file()} == before
-    assert study_folder(load_scene(other)) != study_folder(interrupted.scene)
+        run_study(load_scene(other), interrupted, 0.01, ONE_RUN, silent)
+    assert {file.name: file.read_bytes() for file in interrupted.iterdir() if file.is_file()} == before
+    assert study_folder(load_scene(other)) != study_folder(load_scene(interrupted.parent / "scene.yaml"))
 
 
-def test_damaged_measurements_are_named(begun: Begun, tmp_path: Path) -> None:
+def test_damaged_measurements_are_named(interrupted: Path, tmp_path: Path) -> None:
     copy = tmp_path / "damaged"
     copy.mkdir()
-    shutil.copy(begun.folder / "origin.json", copy)
+    shutil.copy(interrupted / "origin.json", copy)
     (copy / MEASURED).write_text('{"machine": 3}')
     with pytest.raises(ConveyorError, match=r"measured\.json: .*expected"):
-        run_study(begun.scene, copy, 0.01, ONE_RUN, silent)
+        run_study(load_scene(interrupted.parent / "scene.yaml"), copy, 0.01, ONE_RUN, silent)
 
 
 def test_keys_of_settings_tell_them_apart() -> None:
