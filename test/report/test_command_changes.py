@@ -24,7 +24,7 @@ TICKS = 2000
 
 
 def test_each_change_of_a_repeated_command_counts_from_its_tick(tmp_path: Path) -> None:
-    """The same with and without read-back; the counters of the run state the same cycles at the set rates."""
+    """Set rates are equal with and without read-back; the counters of the run state the same cycles at them."""
     sim = Simulation(load_scene(FAILING_LINE))
     initial = dict(zip(sim.process_image.command_names, sim.line.read_back.values, strict=True))
     with (
