@@ -45,8 +45,8 @@ def rebuild(world: World) -> tuple[int, int, int, int, int, int]:
     belts = list_belts(bottles, world.grid, hood.home, world.belts, world.ring, floor, ways, 0.5 * skin)
     copy(bottles.x, hood.x)
     copy(bottles.y, hood.y)
-    fits = _fits_pairs(pairs, more, world.pairs, world.slots) and _fits_near(segments, world.near_segments)
-    fits = fits and _fits_near(arcs, world.near_arcs) and _fits_belts(belts, world.belts)
+    fits = _fits_pairs(pairs, world.pairs) and _fits_slots(more, world.slots) and _fits_belts(belts, world.belts)
+    fits = fits and _fits_near(segments, world.near_segments) and _fits_near(arcs, world.near_arcs)
     fits = fits and _fits_near(bodies, world.near_bodies)
     hood.stale[0] = 0 if fits else 1
     if fits:
@@ -71,10 +71,17 @@ def _floor(surface: Any) -> int:
 
 
 @part
-def _fits_pairs(needed: int, more: int, pairs: Any, slots: Any) -> bool:
+def _fits_pairs(needed: int, pairs: Any) -> bool:
     if pairs is None:
         return True
-    return needed <= pairs.i.size and more <= slots.more_entry.size
+    return needed <= pairs.i.size
+
+
+@part
+def _fits_slots(needed: int, slots: Any) -> bool:
+    if slots is None:
+        return True
+    return needed <= slots.more_entry.size
 
 
 @part

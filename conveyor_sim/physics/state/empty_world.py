@@ -163,7 +163,7 @@ def empty_world(model: Model, slots: int) -> World:
         ),
         probe=GuardProbe(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
         pairs=empty_pairs(model, entries),
-        slots=empty_slots(slots, entries) if model.pair_law is not None else None,
+        slots=empty_slots(slots, entries) if model.pair_law is not None and model.integrator not in SWEPT else None,
         pair_law=model.pair_law,
         curves=model.curves,
         grid=model.grid,
