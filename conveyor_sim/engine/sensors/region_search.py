@@ -31,7 +31,7 @@ class RegionSearch:
         self._first: I8 = np.zeros(1, np.int64)
         self._resize(64)
         self._bottles: Bottles | None = None
-        self._moves = -1
+        self._moves = self._removals = -1
         self._list: Any = None
 
     def add(self, corners: F8) -> int:
@@ -43,18 +43,17 @@ class RegionSearch:
         self._grid, self._bottles = None, None
         return self._start.size - 2
 
-    def inside(self, region: int, bottles: Bottles, moves: int) -> I8:
+    def inside(self, region: int, bottles: Bottles, moves: int, removals: int) -> I8:
         """Return the slots of bottles whose axes are in a region, by its number, (n,), in order.
 
-        They are valid until the next call. moves: changes whenever a bottle is moved or added. Bottles may be removed
-        without a change of it.
+        They are valid until the next call. moves: changes whenever a bottle is moved or added. removals: changes
+        whenever a bottle is removed.
         """
         if bottles is not self._bottles or moves != self._moves:
             self._list_inside(bottles)
-            self._bottles, self._moves = bottles, moves
+            self._bottles, self._moves, self._removals = bottles, moves, removals
         slots = self._inside[self._first.item(region) : self._first.item(region + 1)]
-        there = bottles.id[slots] >= 0
-        return slots if there.all() else slots[there]
+        return slots if removals == self._removals else slots[bottles.id[slots] >= 0]
 
     def _list_inside(self, bottles: Bottles) -> None:
         if self._grid is None:

@@ -28,7 +28,7 @@ def in_polygon(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     search.add(np.array([[5.0, 5.0], [6.0, 5.0], [5.0, 6.0]]))
     region = search.add(corners)
     inside = np.zeros(x.size, dtype=bool)
-    inside[search.inside(region, bottles, 0)] = True
+    inside[search.inside(region, bottles, 0, 0)] = True
     return inside
 
 
@@ -60,11 +60,11 @@ def test_points_on_shared_edges_belong_to_one_polygon() -> None:
 def test_bottles_removed_since_the_search_are_not_inside() -> None:
     search, bottles = RegionSearch(), column(np.array([0.2, 0.1, 3.0, 0.3]), np.full(4, 0.1))
     region = search.add(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
-    assert search.inside(region, bottles, 7).tolist() == [0, 1, 3]
+    assert search.inside(region, bottles, 7, 4).tolist() == [0, 1, 3]
     bottles.id[1] = -1
-    assert search.inside(region, bottles, 7).tolist() == [0, 3]
+    assert search.inside(region, bottles, 7, 5).tolist() == [0, 3]
     bottles.x[2] = 0.0
-    assert search.inside(region, bottles, 8).tolist() == [0, 2, 3]
+    assert search.inside(region, bottles, 8, 5).tolist() == [0, 2, 3]
 
 
 def test_bottles_leave_in_the_region_and_ids_are_not_used_again() -> None:
