@@ -119,31 +119,34 @@ def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Path) -> None:
     assert ratio == pytest.approx(0.5, rel=0.1)
 
 
-def test_a_budget_that_is_spent_leaves_settings_out_and_names_them(interrupted: Path, tmp_path: Path) -> None:
-    """The first settings are measured in any case; a larger budget measures the others, a small one keeps them."""
-    scene = load_scene(interrupted.parent / "scene.yaml")
-    short = run_study(scene, tmp_path, 0.01, NO_TIME, silent)
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory, brief_costs: None) -> tuple[Path, AccuracyStudy]:
+    """A study whose budget was spent before it began, and its folder."""
+    folder = tmp_path_factory.mktemp("short")
+    return folder, run_study(parse_scene(SCENE, "three.yaml"), folder, 0.01, NO_TIME, silent)
+
+
+def test_a_budget_that_is_spent_leaves_settings_out_and_names_them(short: tuple[Path, AccuracyStudy]) -> None:
+    """The first settings are measured in any case; a small budget keeps them."""
+    folder, study = short
+    scene = parse_scene(SCENE, "three.yaml")
     predicted = forecast(scene, 0.01).point
     assert predicted is not None
     first = first_settings(scene, 0.01)
     assert first[0] == predicted.setting
-    assert {point.setting for point in short.points} == set(first)
-    assert short.answer is not None
-    assert short.orders == ()
+    assert {point.setting for point in study.points} == set(first)
+    assert study.answer is not None
+    assert study.orders == ()
     facts = ("not run", "budget", "--thorough")
-    assert any(all(fact in sentence for fact in facts) for sentence in short.skipped)
-    (left_out,) = [sentence for sentence in short.skipped if sentence.startswith("Not measured within the budget")]
+    assert any(all(fact in sentence for fact in facts) for sentence in study.skipped)
+    (left_out,) = [sentence for sentence in study.skipped if sentence.startswith("Not measured within the budget")]
     assert "rk4" in left_out
-    again = run_study(scene, tmp_path, 0.01, NO_TIME, silent)
-    assert again.points == short.points
-    whole = run_study(scene, tmp_path, 0.01, ONE_RUN, silent)
-    assert len(whole.points) > len(short.points)
-    assert whole.orders
-    assert not any("within the budget" in sentence for sentence in whole.skipped)
+    again = run_study(scene, folder, 0.01, NO_TIME, silent)
+    assert again.points == study.points
 
 
-def test_the_time_left_holds_from_phase_to_phase(tmp_path: Path) -> None:
-    """The bounds of a whole study, in the order shown: none grows, and each covers the time that is spent after it."""
+def test_a_larger_budget_measures_the_others_and_the_time_left_holds(short: tuple[Path, AccuracyStudy]) -> None:
+    """The bounds of all phases, in the order shown: none grows, and each covers the time that is spent after it."""
     shown: list[tuple[str, float]] = []
 
     class Recorded:
@@ -157,11 +160,14 @@ def test_the_time_left_holds_from_phase_to_phase(tmp_path: Path) -> None:
     effort = Effort(budget=10.0)
     study = run_study(
         parse_scene(SCENE, "three.yaml"),
-        tmp_path,
+        short[0],
         0.01,
         effort,
         lambda what, _counted: nullcontext(Recorded(what)),
     )
+    assert len(study.points) > len(short[1].points)
+    assert study.orders
+    assert not any("within the budget" in sentence for sentence in study.skipped)
     stages, bounds = zip(*shown, strict=True)
     assert sum("long runs" in stage for stage in dict.fromkeys(stages)) == 3
     assert all(later <= earlier for earlier, later in pairwise(bounds))

@@ -89,11 +89,13 @@ def axes(draw: st.DrawFn, frame: Frame, belts: Data, drives: Data) -> Data:
 
 
 @st.composite
-def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data, alike: bool) -> Data:
+def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data, alike: bool, side_belts: bool) -> Data:
     """Star wheels with carousels, screws and side belts; the fields of these, and `axes` with at least one.
 
     found: axes of the scene. Their limits of torque suffice for their accelerations. alike: draw EACH_WHEEL.
+    side_belts: whether side belts are drawn.
     """
+    kinds = EACH_WHEEL if side_belts else EACH_WHEEL[:-1]
     machines: dict[str, dict[str, Data]] = {"axes": dict(found), "stars": {}, "carousels": {}, "screws": {}}
     machines["side_belts"] = {}
     reach, heaviest = 8.0 * frame.unit, max(kind["mass"] for kind in frame.types.values())
@@ -111,10 +113,10 @@ def wheels(draw: st.DrawFn, frame: Frame, material: str, found: Data, alike: boo
             axis["inertia"] = heaviest * reach**2 * draw(scaled(0.3, 30.0))
             axis["torque_limit"] = axis["inertia"] * axis["acceleration"] * spare
     names = sorted(machines["axes"])
-    for n in range(len(EACH_WHEEL) if alike else draw(st.integers(1, 3))):
+    for n in range(len(kinds) if alike else draw(st.integers(1, 3))):
         axis, pocket = draw(st.sampled_from(names)), frame.unit * draw(st.sampled_from([1.02, 1.2, 2.0]))
         on_axis = {"axis": axis, "material": material, "pocket_radius": pocket}
-        what = EACH_WHEEL[n] if alike else draw(st.sampled_from(EACH_WHEEL)) if n else "star"
+        what = kinds[n] if alike else draw(st.sampled_from(kinds)) if n else "star"
         start, angle = draw(frame.points), draw(between(-math.pi, math.pi))
         length = frame.unit * draw(st.integers(2, 8))
         end = [start[0] + length * math.cos(angle), start[1] + length * math.sin(angle)]

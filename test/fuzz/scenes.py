@@ -74,7 +74,7 @@ def scenes(draw: st.DrawFn, family: Family, beyond: bool = True) -> Data:
     if family.axes:
         data |= draw(axes(frame, data["belts"], data.get("drives", {})))
     if family.wheels:
-        data |= draw(wheels(frame, STEEL, data.get("axes", {}), family.alike))
+        data |= draw(wheels(frame, STEEL, data.get("axes", {}), family.alike, family.side_belts))
     if family.movers:
         data |= draw(movers(frame, STEEL, family.lifts, family.alike))
     clear = _Clear(data, frame)
