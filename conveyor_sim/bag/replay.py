@@ -207,10 +207,10 @@ def _simulation(bag: Bag) -> Simulation:
             f"{bag.path}: format 4 with implicit friction and {model.integrator}, expected another format, solver or "
             "integrator: this version evaluates the friction under bottles at another time of the step"
         )
-    if bag.format < 7 and model.sweeps:
+    if bag.format < 8 and model.sweeps:
         raise BagError(
-            f"{bag.path}: format {bag.format} with integrator {model.integrator}, expected format 7 or another "
-            "integrator: this version solves the contacts of a step in another way"
+            f"{bag.path}: format {bag.format} with integrator {model.integrator}, expected format 8 or another "
+            "integrator: this version solves the contacts of a step in another way or order"
         )
     for axis in model.plant.axes:
         if axis.kind == "position" and f"{axis.name}/blocked" not in bag.line.signal_names:

@@ -224,24 +224,25 @@ def test_the_fifth_format_replays_with_integrators_of_forces() -> None:
 
 
 def test_impulses_of_the_fifth_format_are_refused_and_reported() -> None:
-    with pytest.raises(BagError, match=stating("format 5", "integrator impulses", "expected format 7")):
+    with pytest.raises(BagError, match=stating("format 5", "integrator impulses", "expected format 8")):
         replay(IMPULSES)
     assert summarize(IMPULSES).simulated == pytest.approx(0.2)
     with open_bag(IMPULSES) as bag:
         assert recorded_scene(bag.line, "bag").accuracy.sweeps == 3
 
 
+@pytest.mark.parametrize("number", [6, 7])
 @pytest.mark.parametrize("recording", [EXPLICIT, IMPULSES])
-def test_the_sixth_format_is_refused_with_impulses_only(recording: Path, tmp_path: Path) -> None:
-    def sixth(topic: str, message: Any) -> None:
+def test_these_formats_are_refused_with_impulses_only(recording: Path, number: int, tmp_path: Path) -> None:
+    def renumbered(topic: str, message: Any) -> None:
         if topic == "line":
-            message.format = 6
+            message.format = number
 
-    bag = edited(recording, tmp_path / "sixth", sixth)
+    bag = edited(recording, tmp_path / "renumbered", renumbered)
     if recording == EXPLICIT:
         assert replay(bag).difference is None
     else:
-        with pytest.raises(BagError, match=stating("format 6", "integrator impulses", "expected format 7")):
+        with pytest.raises(BagError, match=stating(f"format {number}", "integrator impulses", "expected format 8")):
             replay(bag)
 
 

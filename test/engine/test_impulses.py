@@ -194,14 +194,21 @@ def test_rebuilds_list_the_pairs_of_slow_fast_and_new_bottles() -> None:
             state.remove(int(fast[0]))
             state.remove(int(fast[1]))
             state.add(kind, x + skin, y, 0.0, 0.0, 0.0, 0.0)
+        speed = random.uniform(0.0, 0.5, bottles.id.size)
+        speed[fast] = 4.0, 4.0, 6.0
+        angle = random.uniform(0.0, 2.0 * math.pi, bottles.id.size)
+        bottles.vx[:], bottles.vy[:] = speed * np.cos(angle), speed * np.sin(angle)
         state.world.neighbourhood.stale[0] = 1
         state.make_lists()
-        pairs, coarse = state.world.pairs, state.world.neighbourhood.coarse
+        pairs, coarse, ways = state.world.pairs, state.world.neighbourhood.coarse, state.world.neighbourhood.ways
         assert pairs is not None
         assert coarse is not None
+        assert ways is not None
+        np.testing.assert_allclose(ways.way, np.minimum(ways.least + ways.time * speed, ways.most), rtol=1e-14)
+        assert ways.way.min() < 0.5 * skin < skin < ways.way.max() == ways.most
         spent.append(int(coarse.spent[0]))
         i, j = np.triu_indices(bottles.id.size, 1)
-        reach = bottles.radius[i] + bottles.radius[j] + skin
+        reach = bottles.radius[i] + bottles.radius[j] + ways.way[i] + ways.way[j]
         near = np.hypot(bottles.x[i] - bottles.x[j], bottles.y[i] - bottles.y[j]) < reach
         near &= (bottles.id[i] >= 0) & (bottles.id[j] >= 0)
         count = int(pairs.used[0])
@@ -220,6 +227,7 @@ def test_lists_that_are_too_short_leave_no_trace() -> None:
     state.world.neighbourhood.stale[0] = 1
     state.make_lists()
     for sim in (one, other):
+        sim._state.world.bottles.vx[:] = -3.0
         sim.advance(100)
     assert state.world.pairs is not None
     assert state.world.pairs.i.size > shortest

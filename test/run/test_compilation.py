@@ -12,13 +12,13 @@ import pytest
 CODE = """
 from scenes import NO_FLOOR, bottle, scene
 from conveyor_sim import Simulation
-from conveyor_sim.engine.sensors.regions import find_inside
+from conveyor_sim.engine.sensors.regions import list_inside
 from conveyor_sim.run.compilation import compile_kernels
 
 region = [[0.2, -1.0], [0.3, -1.0], [0.3, 1.0]]
 parts = {{"part": {{"region": region{more}}}}}
 compile_kernels(scene(bottles=[bottle(0.0, 0.0)], {part}=parts, **NO_FLOOR))
-print(len(find_inside.signatures))
+print(len(list_inside.signatures))
 """
 
 

@@ -23,7 +23,7 @@ from conveyor_sim.scene.recorded import recorded_source
 if TYPE_CHECKING:
     from conveyor_sim.simulation import Simulation
 
-FORMAT = 7
+FORMAT = 8
 """Version of the messages and of the meaning of the recorded scene text (Line.format). It is raised by one at each
 change that a reader must know; `older.py` reads the earlier ones.
 """

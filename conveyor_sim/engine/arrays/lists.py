@@ -40,8 +40,22 @@ class Near(NamedTuple):
 
 
 @group
+class Ways(NamedTuple):
+    """Ways of bottles until the next rebuild, least + time v, at most `most` (`ways.py`)."""
+
+    way: F8
+    """m, (S,)."""
+    least: float
+    """m"""
+    time: float
+    """s"""
+    most: float
+    """m"""
+
+
+@group
 class CoarseList(NamedTuple):
-    """Pairs within one more skin than those of the pair list, from a search of the cells (`coarse.py`)."""
+    """Pairs within twice the skin, from a search of the cells (`coarse.py`)."""
 
     x: F8
     """Positions at this search, (S,)."""
@@ -56,7 +70,8 @@ class CoarseList(NamedTuple):
     spent: I8
     """Sum of strays over the rebuilds since this search, (1,); -1: search at the next rebuild."""
     stray: I8
-    """Scratch of a rebuild: 1 if a bottle has moved too far since this search, or its slot has changed, (S,)."""
+    """Scratch of a rebuild: 1 if a bottle has moved too far since this search, or its slot has changed, or if it is
+    fast, (S,)."""
     strays: U4
     """Scratch of a rebuild: slots of strays, (S,)."""
     cell_stray: I4
@@ -90,8 +105,10 @@ class Neighbourhood(NamedTuple):
     sorted_y: F8
     sorted_radius: F8
     sorted_cell: I8
+    ways: Ways | None
+    """None with integrators whose lists are rebuilt rarely: each bottle may move by half of the skin then."""
     coarse: CoarseList | None
-    """None with integrators whose lists are rebuilt rarely."""
+    """None without ways."""
     home: I4
     """Scratch of a rebuild: cell of the static grid under each bottle, (S,); -1: none, or a free slot."""
 

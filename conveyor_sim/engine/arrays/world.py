@@ -68,6 +68,7 @@ class World(NamedTuple):
     probe: GuardProbe
     pairs: Pairs | None
     slots: Slots | None
+    """None with integrator impulses, which sums no forces."""
     pair_law: ContactLaw | None
     curves: Curves | None
     grid: StaticGrid | None

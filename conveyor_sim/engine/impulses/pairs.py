@@ -5,7 +5,7 @@ No two pairs of a colour share a bottle, so its pairs can be divided among threa
 the same. The columns of a chunk lie in one array at constant distances. LLVM vectorises the law only then.
 
 A pair that holds nothing and can't touch in this substep is left out of its chunk: the law would change nothing. In a
-line these are half of the pairs. Constants are read by pair only in chunks whose pairs differ in kind.
+line these are four of five pairs. Constants are read by pair only in chunks whose pairs differ in kind.
 """
 
 import math
@@ -101,15 +101,16 @@ def _gather(
         vx, vy = body[b + uint64(2)] - body[a + uint64(2)], body[b + uint64(3)] - body[a + uint64(3)]
         held_x, held_y, held_turn = pairs.row[row], pairs.row[row + uint64(1)], pairs.row[row + uint64(2)]
         wait = pairs.row[row + uint64(3)]
-        chunk[_X + c], chunk[_Y + c] = x, y
-        chunk[_VX + c], chunk[_VY + c] = vx, vy
-        chunk[_RIM + c] = body[b + uint64(4)] + body[a + uint64(4)]
-        chunk[_HELD_X + c], chunk[_HELD_Y + c], chunk[_HELD_TURN + c] = held_x, held_y, held_turn
-        chunk[_WAIT + c] = wait
-        listed[c] = p
         reach = body[a + uint64(7)] + body[b + uint64(7)] + FARTHER + h * NEARER * (abs(vx) + abs(vy))
         idle = (held_x == 0.0) & (held_y == 0.0) & (held_turn == 0.0) & (wait == 0.0) & (x * x + y * y > reach * reach)
-        c += uint64(0) if idle else uint64(1)
+        if not idle:
+            chunk[_X + c], chunk[_Y + c] = x, y
+            chunk[_VX + c], chunk[_VY + c] = vx, vy
+            chunk[_RIM + c] = body[b + uint64(4)] + body[a + uint64(4)]
+            chunk[_HELD_X + c], chunk[_HELD_Y + c], chunk[_HELD_TURN + c] = held_x, held_y, held_turn
+            chunk[_WAIT + c] = wait
+            listed[c] = p
+            c += uint64(1)
         p += uint64(1)
     return int(p), int(c)
 

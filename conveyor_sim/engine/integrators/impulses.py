@@ -17,12 +17,8 @@ contacts in a crowd converge slowly, with the root of substeps times sweeps; doc
 
 from typing import Any
 
-from numba import uint64
-
-from conveyor_sim.engine.arrays.bodies import Bottles
-from conveyor_sim.engine.arrays.lists import Neighbourhood
 from conveyor_sim.engine.arrays.world import Worker, World
-from conveyor_sim.engine.compiler.compile import kernel, part
+from conveyor_sim.engine.compiler.compile import kernel
 from conveyor_sim.engine.impulses.bodies import end_bodies, find_bodies, sweep_bodies
 from conveyor_sim.engine.impulses.bottles import begin_substep, end_substep, take_step, warm_anew
 from conveyor_sim.engine.impulses.constants import fill_constants
@@ -33,6 +29,7 @@ from conveyor_sim.engine.impulses.rails import sweep_rails
 from conveyor_sim.engine.impulses.runs import run_of, runs_from, runs_to
 from conveyor_sim.engine.impulses.work import begin_work, book_pressed, mean_velocities
 from conveyor_sim.engine.integrators.motion import lists_hold, probe_rebuilt
+from conveyor_sim.engine.lists.ways import may_leave
 from conveyor_sim.engine.rails.moving import place_rails
 from conveyor_sim.engine.support.footing import check_footing
 from conveyor_sim.engine.threads.workers import BLOCK, MOVED, raise_flag, share, wait_for_all
@@ -84,7 +81,7 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             for run in range(runs_from(impulses.sleep, first), runs_to(impulses.sleep, end)):
                 left, right = run_of(impulses.sleep, first, end, run)
                 end_substep(world, impulses, dt, left, right)
-                if _leaves(bottles, world.neighbourhood, world.settings.skin, dt, left, right):
+                if may_leave(bottles, world.neighbourhood, dt, left, right):
                     raise_flag(worker, MOVED)
             end_loads(world, impulses, dt, first, end)
         book_pressed(world, worker, impulses)
@@ -94,17 +91,3 @@ def advance(world: World, worker: Worker, steps: int, dt: float, phase: int) -> 
             return step + 1
         probe_rebuilt(world, worker)
     return steps
-
-
-@part
-def _leaves(bottles: Bottles, hood: Neighbourhood, skin: float, h: float, first: int, end: int) -> bool:
-    """Return True if a bottle of first to end may leave half of the skin in the next substep.
-
-    Contacts are solved before the bottles touch, so the lists must hold for the way of a substep more.
-    """
-    far = 0
-    for i in range(uint64(first), uint64(end)):
-        dx = abs(bottles.x[i] - hood.x[i]) + h * abs(bottles.vx[i])
-        dy = abs(bottles.y[i] - hood.y[i]) + h * abs(bottles.vy[i])
-        far |= dx * dx + dy * dy > 0.25 * skin * skin
-    return far != 0

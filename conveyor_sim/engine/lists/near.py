@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rail pieces and bodies near each bottle, within its radius and half the skin; listed at each rebuild.
+"""Rail pieces and bodies near each bottle, within its radius and its way until the next rebuild.
 
 Tangential springs at rails are stored by piece: a bottle that passes a joint from one piece of a surface to the next
 starts a new spring there.
@@ -13,13 +13,19 @@ from conveyor_sim.engine.arrays.lists import BottleList, Near
 from conveyor_sim.engine.arrays.types import I4
 from conveyor_sim.engine.compiler.compile import kernel, part
 from conveyor_sim.engine.impulses.carry import restore_near, store_near
+from conveyor_sim.engine.lists.ways import margin_of
 from conveyor_sim.engine.rails.poses import list_near_axes
 from conveyor_sim.engine.threads.workers import UNIT
 
 
 @part
-def list_near_segments(bottles: Bottles, grid: Any, homes: I4, segments: Any, near: Any, margin: float) -> int:
-    """List the straight rail pieces within radius + margin of each bottle; return the number of entries needed."""
+def list_near_segments(
+    bottles: Bottles, grid: Any, homes: I4, segments: Any, near: Any, ways: Any, margin: float
+) -> int:
+    """List the straight rail pieces within the radius and the way of each bottle; return the number of entries needed.
+
+    margin: way, in m, where `ways` is None.
+    """
     if segments is None:
         return 0
     _copy_springs(near, near.springs)
@@ -30,7 +36,7 @@ def list_near_segments(bottles: Bottles, grid: Any, homes: I4, segments: Any, ne
         home = homes[i]
         if home < 0:
             continue
-        reach = bottles.radius[i] + margin
+        reach = bottles.radius[i] + margin_of(ways, i, margin)
         for entry in range(grid.segment_start[home], grid.segment_start[home + 1]):
             g = grid.segment[entry]
             dx = bottles.x[i] - segments.x[g]
@@ -51,8 +57,8 @@ def list_near_segments(bottles: Bottles, grid: Any, homes: I4, segments: Any, ne
 
 
 @part
-def list_near_arcs(bottles: Bottles, grid: Any, homes: I4, arcs: Any, near: Any, margin: float) -> int:
-    """List the arcs within radius + margin of each bottle; return the number of entries needed."""
+def list_near_arcs(bottles: Bottles, grid: Any, homes: I4, arcs: Any, near: Any, ways: Any, margin: float) -> int:
+    """List the arcs within the radius and the way of each bottle, as `list_near_segments`."""
     if arcs is None:
         return 0
     _copy_springs(near, near.springs)
@@ -63,7 +69,7 @@ def list_near_arcs(bottles: Bottles, grid: Any, homes: I4, arcs: Any, near: Any,
         home = homes[i]
         if home < 0:
             continue
-        reach = bottles.radius[i] + margin
+        reach = bottles.radius[i] + margin_of(ways, i, margin)
         for entry in range(grid.arc_start[home], grid.arc_start[home + 1]):
             k = grid.arc[entry]
             dx = bottles.x[i] - arcs.x[k]
@@ -81,8 +87,8 @@ def list_near_arcs(bottles: Bottles, grid: Any, homes: I4, arcs: Any, near: Any,
 
 
 @part
-def list_near_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any, margin: float) -> int:
-    """List the bodies whose sweep is within radius + margin of each bottle, and the axes of these bodies.
+def list_near_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any, ways: Any, margin: float) -> int:
+    """List the bodies whose sweep is within the radius and the way of each bottle, and the axes of these bodies.
 
     Return the number of entries needed. near: None if bottles pass through bodies; no body is near a bottle then.
     """
@@ -90,13 +96,13 @@ def list_near_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: 
         return 0
     for b in range(moving.is_near.size):
         moving.is_near[b] = 0
-    count = _list_bodies(bottles, grid, homes, moving, near, margin)
+    count = _list_bodies(bottles, grid, homes, moving, near, ways, margin)
     list_near_axes(moving)
     return count
 
 
 @part
-def _list_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any, margin: float) -> int:
+def _list_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any, ways: Any, margin: float) -> int:
     if near is None:
         return 0
     count = 0
@@ -105,7 +111,7 @@ def _list_bodies(bottles: Bottles, grid: Any, homes: I4, moving: Any, near: Any,
         home = homes[i]
         if home < 0:
             continue
-        reach = bottles.radius[i] + margin
+        reach = bottles.radius[i] + margin_of(ways, i, margin)
         for entry in range(grid.body_start[home], grid.body_start[home + 1]):
             b = grid.body[entry]
             inside_x = moving.sweep[b, 0] - reach <= bottles.x[i] <= moving.sweep[b, 2] + reach

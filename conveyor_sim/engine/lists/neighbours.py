@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verlet list of bottle pairs that may touch; it holds until a bottle has moved by half the skin.
+"""Verlet list of bottle pairs that may touch; it holds until a bottle has exceeded its way, else half the skin.
 
 It is sorted by slot, so that sums over it, and hence the bits of a run, do not depend on the time of a rebuild.
 """
@@ -16,6 +16,7 @@ from conveyor_sim.engine.compiler.compile import kernel, part, written
 from conveyor_sim.engine.impulses.carry import store_pairs
 from conveyor_sim.engine.lists.cells import bucket_of, number_of, sort_into_cells
 from conveyor_sim.engine.lists.coarse import prepare_coarse
+from conveyor_sim.engine.lists.ways import cells_around, skin_between
 
 
 @part
@@ -40,7 +41,7 @@ def list_pairs(bottles: Bottles, hood: Neighbourhood, pairs: Any, cell: float, s
 def _find_pairs(bottles: Bottles, hood: Neighbourhood, coarse: Any, pairs: Pairs, cell: float, skin: float) -> int:
     """Write the pairs; return their number, which may exceed the capacity."""
     if _is_prepared(bottles, hood, coarse, cell, skin):
-        return _filter_coarse(bottles, coarse, pairs, skin)
+        return _filter_coarse(bottles, hood, coarse, pairs, skin)
     return _search_cells(bottles, hood, pairs, cell, skin)
 
 
@@ -48,28 +49,29 @@ def _find_pairs(bottles: Bottles, hood: Neighbourhood, coarse: Any, pairs: Pairs
 def _is_prepared(bottles: Bottles, hood: Neighbourhood, coarse: Any, cell: float, skin: float) -> bool:
     if coarse is None:
         return False
-    return prepare_coarse(bottles, hood, coarse, cell, skin)
+    return prepare_coarse(bottles, hood, coarse, hood.ways, cell, skin)
 
 
 @part
 def _search_cells(bottles: Bottles, hood: Neighbourhood, pairs: Pairs, cell: float, skin: float) -> int:
-    """Find the pairs among bottles in adjacent cells."""
+    """Find the pairs among bottles in cells around each."""
     sort_into_cells(bottles, hood, cell)
+    rings = cells_around(hood.ways, cell, skin)
     buckets = hood.bucket.size - 1
     capacity, count = pairs.i.size, 0
     for i in range(bottles.x.size):
         if bottles.id[i] < 0:
             continue
         first = count
-        for cx in range(hood.cell[i, 0] - 1, hood.cell[i, 0] + 2):
-            for cy in range(hood.cell[i, 1] - 1, hood.cell[i, 1] + 2):
+        for cx in range(hood.cell[i, 0] - rings, hood.cell[i, 0] + rings + 1):
+            for cy in range(hood.cell[i, 1] - rings, hood.cell[i, 1] + rings + 1):
                 b = bucket_of(cx, cy, buckets)
                 number = number_of(cx, cy)
                 for entry in range(uint64(hood.bucket[b]), uint64(hood.bucket[b + 1])):
                     j = hood.order[entry]
                     dx = hood.sorted_x[entry] - bottles.x[i]
                     dy = hood.sorted_y[entry] - bottles.y[i]
-                    reach = bottles.radius[i] + hood.sorted_radius[entry] + skin
+                    reach = bottles.radius[i] + hood.sorted_radius[entry] + skin_between(hood.ways, i, j, skin)
                     near = (dx * dx + dy * dy < reach * reach) & (hood.sorted_cell[entry] == number)
                     # Most candidates are none, in no order, so a branch on `near` would often be predicted wrongly. In
                     # a full list, a candidate must not replace the last pair.
@@ -81,7 +83,7 @@ def _search_cells(bottles: Bottles, hood: Neighbourhood, pairs: Pairs, cell: flo
 
 
 @part
-def _filter_coarse(bottles: Bottles, coarse: Any, pairs: Pairs, skin: float) -> int:
+def _filter_coarse(bottles: Bottles, hood: Neighbourhood, coarse: Any, pairs: Pairs, skin: float) -> int:
     """Take the pairs from the coarse list, and those of strays from their lists."""
     if coarse is None:
         return 0
@@ -95,7 +97,7 @@ def _filter_coarse(bottles: Bottles, coarse: Any, pairs: Pairs, skin: float) -> 
                 j = coarse.j[entry]
                 dx = bottles.x[j] - x
                 dy = bottles.y[j] - y
-                reach = radius + bottles.radius[j] + skin
+                reach = radius + bottles.radius[j] + skin_between(hood.ways, i, j, skin)
                 if count < capacity:
                     pairs.i[count] = i
                     pairs.j[count] = j

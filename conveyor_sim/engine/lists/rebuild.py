@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Rebuild of all neighbour lists together, which is due once a bottle has moved by half of the skin.
+"""Rebuild of all neighbour lists together, which is due once a bottle has moved by its way, or half of the skin.
 
 The time of a rebuild depends on the state alone, not on the division of a run into calls.
 """
@@ -17,6 +17,7 @@ from conveyor_sim.engine.impulses.carry import order_pairs
 from conveyor_sim.engine.lists.near import list_near_arcs, list_near_bodies, list_near_segments, list_railed
 from conveyor_sim.engine.lists.neighbours import list_pairs
 from conveyor_sim.engine.lists.static_grid import find_homes
+from conveyor_sim.engine.lists.ways import plan_ways
 from conveyor_sim.engine.rails.poses import place_bodies
 from conveyor_sim.engine.support.belts import list_belts
 from conveyor_sim.engine.support.footing import refresh_footing
@@ -31,19 +32,21 @@ def rebuild(world: World) -> tuple[int, int, int, int, int, int]:
     again.
     """
     bottles, hood = world.bottles, world.neighbourhood
-    skin = world.settings.skin
+    skin, ways = world.settings.skin, hood.ways
+    plan_ways(bottles, ways)
     find_homes(bottles, world.grid, hood.home)
     pairs = list_pairs(bottles, hood, world.pairs, world.settings.cell, skin)
     more = fill_slots(world.pairs, world.slots)
-    segments = list_near_segments(bottles, world.grid, hood.home, world.segments, world.near_segments, 0.5 * skin)
-    arcs = list_near_arcs(bottles, world.grid, hood.home, world.arcs, world.near_arcs, 0.5 * skin)
-    bodies = list_near_bodies(bottles, world.grid, hood.home, world.moving, world.near_bodies, 0.5 * skin)
+    segments = list_near_segments(bottles, world.grid, hood.home, world.segments, world.near_segments, ways, 0.5 * skin)
+    arcs = list_near_arcs(bottles, world.grid, hood.home, world.arcs, world.near_arcs, ways, 0.5 * skin)
+    bodies = list_near_bodies(bottles, world.grid, hood.home, world.moving, world.near_bodies, ways, 0.5 * skin)
     list_railed(bottles, world.near_segments, world.near_arcs, world.near_bodies, world.railed)
-    belts = list_belts(bottles, world.grid, hood.home, world.belts, world.ring, _floor(world.surface), 0.5 * skin)
+    floor = _floor(world.surface)
+    belts = list_belts(bottles, world.grid, hood.home, world.belts, world.ring, floor, ways, 0.5 * skin)
     copy(bottles.x, hood.x)
     copy(bottles.y, hood.y)
-    fits = _fits_pairs(pairs, more, world.pairs, world.slots) and _fits_near(segments, world.near_segments)
-    fits = fits and _fits_near(arcs, world.near_arcs) and _fits_belts(belts, world.belts)
+    fits = _fits_pairs(pairs, world.pairs) and _fits_slots(more, world.slots) and _fits_belts(belts, world.belts)
+    fits = fits and _fits_near(segments, world.near_segments) and _fits_near(arcs, world.near_arcs)
     fits = fits and _fits_near(bodies, world.near_bodies)
     hood.stale[0] = 0 if fits else 1
     if fits:
@@ -68,10 +71,17 @@ def _floor(surface: Any) -> int:
 
 
 @part
-def _fits_pairs(needed: int, more: int, pairs: Any, slots: Any) -> bool:
+def _fits_pairs(needed: int, pairs: Any) -> bool:
     if pairs is None:
         return True
-    return needed <= pairs.i.size and more <= slots.more_entry.size
+    return needed <= pairs.i.size
+
+
+@part
+def _fits_slots(needed: int, slots: Any) -> bool:
+    if slots is None:
+        return True
+    return needed <= slots.more_entry.size
 
 
 @part

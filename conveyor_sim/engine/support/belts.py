@@ -9,6 +9,7 @@ from conveyor_sim.engine.arrays.support import Belts
 from conveyor_sim.engine.arrays.types import I4
 from conveyor_sim.engine.compiler.compile import part
 from conveyor_sim.engine.lists.near import end_list
+from conveyor_sim.engine.lists.ways import margin_of
 from conveyor_sim.engine.support.sector import span_distance
 from conveyor_sim.engine.threads.workers import UNIT
 
@@ -66,8 +67,13 @@ def surface_velocity(h: int, x: float, y: float, surface: Any, turn: Any) -> tup
 
 
 @part
-def list_belts(bottles: Bottles, grid: Any, homes: I4, belts: Any, ring: Any, floor: int, margin: float) -> int:
-    """Store the belt that covers a base and the `margin` (m) around it, or list candidates. Return their number."""
+def list_belts(
+    bottles: Bottles, grid: Any, homes: I4, belts: Any, ring: Any, floor: int, ways: Any, margin: float
+) -> int:
+    """Store the belt that covers a base and the way around it, or list candidates. Return their number.
+
+    margin: way, in m, where `ways` is None.
+    """
     if belts is None:
         return 0
     count = 0
@@ -78,7 +84,8 @@ def list_belts(bottles: Bottles, grid: Any, homes: I4, belts: Any, ring: Any, fl
         belts.start[i] = min(count, belts.candidate.size)
         belts.certain[i] = floor
         if homes[i] >= 0:
-            count = _list_candidates(i, bottles, grid, homes[i], belts, margin + _base_radius(ring, i), count)
+            around = margin_of(ways, i, margin) + _base_radius(ring, i)
+            count = _list_candidates(i, bottles, grid, homes[i], belts, around, count)
         if belts.certain[i] < 0:
             belts.uncertain.bottle[uncertain] = i
             uncertain += 1

@@ -40,7 +40,7 @@ class Region:
 
     def inside(self, now: ScanContext) -> I8:
         """Return the slots of bottles whose axes are inside, (n,). Valid until the next call."""
-        return self._search.inside(self._number, now.state.world.bottles, now.state.moves)
+        return self._search.inside(self._number, now.state.world.bottles, now.state.moves, now.state.removals)
 
 
 MOST_OFFSET = 1000.0

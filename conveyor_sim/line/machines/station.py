@@ -41,8 +41,8 @@ class TakingDevice(MachineDevice):
 
     def queue(self, now: ScanContext) -> Mapping[int, int]:
         """Update `waiting`, and return the slots of the waiting bottles by their ids."""
-        bottles = now.state.world.bottles
-        slot_of = {int(bottles.id[slot]): slot for slot in self._region.inside(now).tolist()}
+        slots = self._region.inside(now)
+        slot_of = dict(zip(now.state.world.bottles.id[slots].tolist(), slots.tolist(), strict=True))
         if slot_of.keys() != set(self.waiting):
             stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
             self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))

@@ -17,7 +17,7 @@ from conveyor_sim.engine.arrays.rails import Arcs, Segments
 from conveyor_sim.engine.arrays.types import F8
 from conveyor_sim.engine.arrays.world import EngineSettings
 from conveyor_sim.engine.compiler.compile import ENGINE_HASH
-from conveyor_sim.engine.integrators import AHEAD, LAG, WARM
+from conveyor_sim.engine.integrators import AHEAD, LAG, SWEPT, WARM
 from conveyor_sim.errors import SceneError
 from conveyor_sim.physics.effects.choice import prediction_of
 from conveyor_sim.physics.effects.declaration import EffectChoice
@@ -30,7 +30,7 @@ from conveyor_sim.physics.model.remedies import too_many
 from conveyor_sim.physics.model.step_choice import choose_steps
 from conveyor_sim.physics.plant import Plant
 from conveyor_sim.physics.sources_hash import sources_hash
-from conveyor_sim.physics.timestep.bounds import IMPULSE_SKIN, SKIN, Bound
+from conveyor_sim.physics.timestep.bounds import IMPULSE_SKIN, LEAST_WAY, MOST_WAY, SKIN, WAY_TIME, Bound
 from conveyor_sim.physics.timestep.prediction import Impact, Prediction
 from conveyor_sim.physics.timestep.settling import Settling, settling
 from conveyor_sim.scene.accuracy import MOST_STEPS
@@ -79,6 +79,11 @@ class Model:
     """(T, 2), m, heights of the contact band and of the centre of gravity; NaN where unknown."""
     plant: Plant
     settings: EngineSettings
+    ways: tuple[float, float, float] | None
+    """Least way of a bottle until the lists are rebuilt (m), its time at its speed (s), longest way (m).
+
+    None with integrators other than impulses.
+    """
     pair_law: ContactLaw | None
     """(T * T,), bottle and bottle; None where bottles do not touch bottles."""
     rail_law: ContactLaw | None
@@ -118,7 +123,10 @@ def build_model(scene: Scene) -> Model:
         raise SceneError(f"{Places(scene).of(('accuracy',))}: accuracy: {too_many(scene, choice)}")
     types = list(scene.bottle_types.values())
     radius = np.array([kind.radius for kind in types])
-    skin = (IMPULSE_SKIN if scene.accuracy.integrator == "impulses" else SKIN) * float(radius.min())
+    smallest = float(radius.min())
+    swept = scene.accuracy.integrator in SWEPT
+    skin = (IMPULSE_SKIN if swept else SKIN) * smallest
+    ways = (LEAST_WAY * smallest, WAY_TIME, MOST_WAY * smallest) if swept else None
     segments, arcs = rail_arrays(plant.rails_at_rest, plant.rail_materials)
     dt = scene.tick_ns * 1e-9 / steps
     warm = "implicit_friction" in on and scene.accuracy.integrator in WARM and not scene.friction_anew
@@ -161,6 +169,7 @@ def build_model(scene: Scene) -> Model:
             warm=1 if warm else None,
             lag=LAG.get(scene.accuracy.integrator, 0.0),
         ),
+        ways=ways,
         pair_law=laws.pair,
         rail_law=laws.rail,
         rebounds=build_rebounds(laws.pair, laws.rail, np.array([kind.mass for kind in types])),
@@ -175,7 +184,7 @@ def build_model(scene: Scene) -> Model:
             plant.sweeps,
             float(radius.max()),
             _largest(laws.base_radius),
-            skin,
+            skin if ways is None else max(skin, ways[-1]),
         ),
         base_friction=_friction_table(laws),
         base_spring=laws.base_spring,

@@ -24,7 +24,7 @@ from conveyor_sim.engine.arrays.impulses import (
     WorkScratch,
 )
 from conveyor_sim.engine.arrays.integrators import Blocks, Linear, PairTangent, Slopes, Stage, Triple
-from conveyor_sim.engine.arrays.lists import CoarseList, Near, NearSprings, Neighbourhood
+from conveyor_sim.engine.arrays.lists import CoarseList, Near, NearSprings, Neighbourhood, Ways
 from conveyor_sim.engine.arrays.moving import MovingBodies
 from conveyor_sim.engine.arrays.observers import GuardProbe, LedgerArrays
 from conveyor_sim.engine.arrays.riding import Riding
@@ -157,12 +157,13 @@ def empty_world(model: Model, slots: int) -> World:
             sorted_y=reals(),
             sorted_radius=reals(),
             sorted_cell=np.zeros(slots, np.int64),
+            ways=None if model.ways is None else Ways(reals(), *model.ways),
             coarse=_coarse_list(slots, buckets) if model.integrator in SWEPT else None,
             home=np.zeros(slots, np.int32),
         ),
         probe=GuardProbe(np.zeros(2), np.zeros(2, np.int64), np.zeros(2, np.int64), np.zeros(1, np.int64)),
         pairs=empty_pairs(model, entries),
-        slots=empty_slots(slots, entries) if model.pair_law is not None else None,
+        slots=empty_slots(slots, entries) if model.pair_law is not None and model.integrator not in SWEPT else None,
         pair_law=model.pair_law,
         curves=model.curves,
         grid=model.grid,

@@ -48,6 +48,8 @@ class State:
         self._fill: dict[tuple[np.dtype[Any], np.dtype[Any]], Any] = {}
         self.moves = 0
         """Number of changes of positions: by ticks, by bottles that were added, and by edits."""
+        self.removals = 0
+        """Number of bottles that have left the line."""
 
     def add(self, kind: int, x: float, y: float, theta: float, vx: float, vy: float, omega: float) -> int:
         """Put a new bottle of a type at (x, y) m, moving at m/s and rad/s, into the first free slot. Return its id."""
@@ -131,6 +133,7 @@ class State:
         for column in slot_columns(world.damage) if world.damage is not None else ():
             column[slot] = 0
         world.bottles.id[slot] = -1
+        self.removals += 1
         if world.static_friction is not None:
             world.static_friction.belt[slot] = -1
         heapq.heappush(self._free, slot)

@@ -8,7 +8,18 @@ from dataclasses import dataclass
 SKIN = 0.2
 """Ratio of the neighbour lists' skin to the smallest radius, a compromise between rare rebuilds and short lists."""
 IMPULSE_SKIN = 0.9
-"""Ratio for integrator impulses, in whose long steps bottles on fast belts move by millimetres."""
+"""Ratio for integrator impulses, in whose long steps bottles on fast belts move by millimetres.
+
+Half of this skin is the gap from which contacts with rails are evaluated.
+"""
+
+LEAST_WAY, MOST_WAY = 0.3, 1.5
+"""Ratios of the ways until the next rebuild, with integrator impulses, to the smallest radius (`engine/lists/ways.py`).
+
+The least is that of a bottle at rest, which may be pushed or struck.
+"""
+WAY_TIME = 0.02
+"""Time in which a bottle may move on at its speed until the next rebuild, s. Shorter lists are rebuilt more often."""
 
 IMPULSE_WAY = 0.1
 """Ratio of a bottle's largest way in a step of integrator impulses to the smallest radius.

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Outfeeds: bottles whose axes are in the region leave. Their slots are used again, their ids are not."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 from scenes import RADIUS, base, belt, contact, segment, simulation
 from worlds import FAR
 
-from conveyor_sim.engine.sensors.regions import find_inside
+from conveyor_sim.engine.sensors.region_search import RegionSearch
 
 STAR = np.array([[0.0, 1.0], [0.2, 0.3], [1.0, 0.2], [0.3, -0.1], [0.6, -0.9], [0.0, -0.3], [-0.7, -0.8], [-0.3, 0.0],
                  [-1.0, 0.4], [-0.2, 0.3]])  # fmt: skip
@@ -21,10 +24,16 @@ def winding(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def in_polygon(corners: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Return whether bottles at (x, y) are inside."""
-    slots, every = np.empty(x.size, np.int64), np.arange(x.size)
+    search, bottles = RegionSearch(), column(x, y)
+    search.add(np.array([[5.0, 5.0], [6.0, 5.0], [5.0, 6.0]]))
+    region = search.add(corners)
     inside = np.zeros(x.size, dtype=bool)
-    inside[slots[: find_inside(corners, x, y, every, every, 0, x.size, slots)]] = True
+    inside[search.inside(region, bottles, 0, 0)] = True
     return inside
+
+
+def column(x: np.ndarray, y: np.ndarray) -> Any:
+    return SimpleNamespace(x=x, y=y, id=np.arange(x.size))
 
 
 def test_points_in_a_concave_polygon() -> None:
@@ -46,6 +55,16 @@ def test_points_on_shared_edges_belong_to_one_polygon() -> None:
     halves = [np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0]]), np.array([[0.0, 0.0], [2.0, 2.0], [0.0, 2.0]])]
     count = sum(in_polygon(half, x, y).astype(int) for half in halves)
     np.testing.assert_array_equal(count[inner], 1)
+
+
+def test_bottles_removed_since_the_search_are_not_inside() -> None:
+    search, bottles = RegionSearch(), column(np.array([0.2, 0.1, 3.0, 0.3]), np.full(4, 0.1))
+    region = search.add(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    assert search.inside(region, bottles, 7, 4).tolist() == [0, 1, 3]
+    bottles.id[1] = -1
+    assert search.inside(region, bottles, 7, 5).tolist() == [0, 3]
+    bottles.x[2] = 0.0
+    assert search.inside(region, bottles, 8, 5).tolist() == [0, 2, 3]
 
 
 def test_bottles_leave_in_the_region_and_ids_are_not_used_again() -> None:
