@@ -18,9 +18,9 @@ DISTRO ?= jazzy
 SCENE ?= config/paper_plant.yaml
 VENV := $(if $(filter jazzy,$(DISTRO)),.venv,.venv-$(DISTRO))
 PYTHON := $(VENV)/bin/python
-# Three processes of tests on two cores: many wait for others. A module stays in one, for its tests share nodes and what was compiled.
+# Four processes of tests on two cores: many wait for others. A module stays in one, for its tests share nodes and what was compiled.
 # test/conftest.py says what one of them takes whole, and what they begin with.
-SIDE_BY_SIDE := --numprocesses=3 --dist=loadfile --no-loadscope-reorder
+SIDE_BY_SIDE := --numprocesses=4 --dist=loadfile --no-loadscope-reorder
 
 # The environment is private: nothing of a sourced ROS, nor of another environment of ROS wheels, may reach it.
 ifneq ($(AMENT_PREFIX_PATH)$(ROS_DISTRO)$(_ROS_WHEELS_BOOTSTRAP_COMPLETE),)

@@ -34,7 +34,7 @@ LONGEST = (
     "ros/test_pages.py", "test_brewery.py", "ros/test_node_source.py", "ros/test_floods.py", "page/test_live.py",
     "testing/test_tutorial_line.py", "page/test_page.py", "test_simulation.py",
 )  # fmt: skip
-"""Other files that took more than 35 s where three processes shared two cores, the longest first."""
+"""Other files that took more than 35 s where processes shared two cores, the longest first."""
 
 
 def pytest_configure() -> None:

@@ -43,11 +43,15 @@ def test_the_line_starts_and_fills(line: Lines) -> None:
     plant.panel.press("start")
     plant.run_for(0.2)
     plant.panel.release("start")
-    plant.eventually(lambda s: s["carousels/block_heads/good"] >= 1, within=55.0)
-    filled, packed = plant.signals["carousels/block_valves/good"], plant.signals["machines/packer/taken"]
-    plant.run_for(6.0)
-    signals = plant.signals
-    assert abs(signals["carousels/block_valves/good"] - filled - 6.0 * RATE) <= 3.0
+    plant.eventually(lambda s: s["carousels/block_heads/good"] >= 1, within=70.0)
+    packed, at_rate = plant.signals["machines/packer/taken"], False
+    # In one of five starts, the first combiner clears a jam, and the block starts slowly.
+    while not at_rate and plant.time < 120.0:
+        filled = plant.signals["carousels/block_valves/good"]
+        plant.run_for(6.0)
+        signals = plant.signals
+        at_rate = abs(signals["carousels/block_valves/good"] - filled - 6.0 * RATE) <= 3.0
+    assert at_rate
     assert signals["machines/packer/taken"] > packed > 200
     assert signals["machines/pasteuriser/held"] > 300
     assert signals["carousels/block_valves/lost"] == signals["carousels/block_heads/lost"] == 0.0

@@ -18,7 +18,7 @@ LEAST_WAY, MOST_WAY = 0.3, 1.5
 
 The least is that of a bottle at rest, which may be pushed or struck.
 """
-WAY_TIME = 0.02
+WAY_TIME = 0.025
 """Time in which a bottle may move on at its speed until the next rebuild, s. Shorter lists are rebuilt more often."""
 
 IMPULSE_WAY = 0.1
