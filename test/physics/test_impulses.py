@@ -149,10 +149,13 @@ def test_a_bottle_on_a_turntable_creeps_outward() -> None:
 @pytest.mark.parametrize("stiffness", [1e3, 1e5, 1e7, 1e9])
 @pytest.mark.parametrize("sweeps", [1, 2])
 def test_a_crowd_is_stable_at_any_stiffness(stiffness: float, sweeps: int) -> None:
-    """It comes to rest on a moving belt, up to creep, without overlaps beyond those of its springs."""
+    """It comes to rest on a moving belt, up to creep, without overlaps beyond those of its springs.
+
+    The last bottles come to rest after 4 to 5.5 s, depending on the order in which pairs are solved.
+    """
     given = crowd(6, 5, contacts=[glass(stiffness=stiffness), glass("steel", 2.0 * stiffness)])
     sim = run(8, sweeps, **{name: given[name] for name in ("belts", "rails", "bottles", "contacts")})
-    sim.advance(400)
+    sim.advance(600)
     load = 6 * 0.4 * MU_BASE * G
     assert sim.integration.shortened_ticks == 0
     assert sim.integration.deepest_overlap * RADIUS < 8.0 * load / stiffness + 1e-3
