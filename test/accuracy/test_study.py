@@ -89,7 +89,7 @@ def interrupted(tmp_path_factory: pytest.TempPathFactory, brief_costs: None) -> 
 
 
 def test_a_killed_study_goes_on_to_the_same_tables(interrupted: Path) -> None:
-    """What was measured is not measured again, and finished runs stay; the rest is as if nothing had happened."""
+    """A resumed study keeps finished measurements and runs, and ends with the tables of an uninterrupted one."""
     scene = load_scene(interrupted.parent / "scene.yaml")
     copy = interrupted.with_name("from_measured")
     copy.mkdir()

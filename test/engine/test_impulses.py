@@ -217,6 +217,35 @@ def test_rebuilds_list_the_pairs_of_slow_fast_and_new_bottles() -> None:
     assert 2 < spent.count(0) < 30
 
 
+def test_without_room_for_the_coarse_list_all_cells_are_searched() -> None:
+    """The cells around a bottle then reach as far as the longest ways."""
+    state, random = pressed_crowd()._state, np.random.default_rng(7)
+    hood = state.world.neighbourhood
+    assert hood.coarse is not None
+    short = {name: np.zeros(8, getattr(hood.coarse, name).dtype) for name in ("j", "other", "before")}
+    state.world = state.world._replace(neighbourhood=hood._replace(coarse=hood.coarse._replace(**short)))
+    for _ in range(5):
+        bottles = state.world.bottles
+        slots = np.flatnonzero(bottles.id >= 0)
+        bottles.x[slots] += random.uniform(-0.3, 0.3, slots.size) * state.model.settings.skin
+        bottles.vx[:] = random.uniform(0.0, 0.5, bottles.id.size)
+        bottles.vx[random.choice(slots, 9, replace=False)] = 6.0
+        state.world.neighbourhood.stale[0] = 1
+        state.make_lists()
+        pairs, hood = state.world.pairs, state.world.neighbourhood
+        assert pairs is not None
+        assert hood.coarse is not None
+        assert hood.ways is not None
+        assert hood.coarse.spent[0] == -1
+        i, j = np.triu_indices(bottles.id.size, 1)
+        reach = bottles.radius[i] + bottles.radius[j] + hood.ways.way[i] + hood.ways.way[j]
+        near = np.hypot(bottles.x[i] - bottles.x[j], bottles.y[i] - bottles.y[j]) < reach
+        near &= (bottles.id[i] >= 0) & (bottles.id[j] >= 0)
+        count = int(pairs.used[0])
+        np.testing.assert_array_equal(pairs.i[:count], i[near])
+        np.testing.assert_array_equal(pairs.j[:count], j[near])
+
+
 def test_lists_that_are_too_short_leave_no_trace() -> None:
     """A call returns where a rebuilt list does not fit; the rest of the tick follows with a longer one."""
     one, other = pressed_crowd(), pressed_crowd()

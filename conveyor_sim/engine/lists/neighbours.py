@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Verlet list of bottle pairs that may touch; it holds until a bottle has exceeded its way, else half the skin.
+"""Verlet list of bottle pairs that may touch; it holds until a bottle has moved by its way, or half the skin.
 
 It is sorted by slot, so that sums over it, and hence the bits of a run, do not depend on the time of a rebuild.
 """
