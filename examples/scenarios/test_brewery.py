@@ -88,6 +88,48 @@ def test_the_line_is_empty_before_the_next_bottle_comes(line: Lines) -> None:
     assert plant.simulation.bottles().type.tolist().count(full) == 84 - 72 - rejected < 24
 
 
+def test_a_squeezed_bottle_stops_the_block_until_an_operator_takes_it_away(line: Lines) -> None:
+    plant = line("brewery", SHORT)
+    plant.attach(brewery())
+
+    def push(button: str) -> None:
+        plant.panel.press(button)
+        plant.run_for(0.2)
+        plant.panel.release(button)
+
+    plant.run_for(0.5)
+    push("start")
+    plant.eventually(lambda s: s["gates/block_stop/is_open"] == 1.0, within=30.0)
+    plant.inject("stars/block_in/slip", 0.15)
+    plant.eventually(lambda s: s["axes/block_inlet/fault"] == 1.0, within=5.0)
+    plant.eventually(lambda s: s["axes/block_filler/speed"] == 0.0, within=3.0)
+    assert plant.signals["belts/block_infeed/running"] == 0.0 and plant.signals["belts/spread/running"] == 1.0
+    plant.inject("stars/block_in/slip", 0.0)
+    bottles = plant.simulation.bottles()
+    places = zip(bottles.id.tolist(), bottles.x.tolist(), bottles.y.tolist(), strict=True)
+    plant.simulation.delete(*(bottle for bottle, x, y in places if abs(x - 35.86) < 0.5 and abs(y - 0.817) < 0.5))
+    plant.run_for(0.5)
+    push("reset")
+    plant.eventually(lambda s: s["axes/block_inlet/following_error"] == 0.0, within=10.0)
+    push("start")
+    plant.eventually(lambda s: s["axes/block_master/speed"] > 20.0, within=10.0)
+    assert "axes/block_inlet/fault" not in plant.alarms
+
+
+def test_a_stuck_eye_makes_the_combiner_clear_itself_with_an_alarm(line: Lines) -> None:
+    plant = line("brewery", {**SHORT, "bottles": []})
+    plant.attach(StructuredText(PROJECT))
+    plant.inject("photo_eyes/label_standing/stuck_on", 1)
+    plant.run_for(0.5)
+    plant.panel.press("start")
+    plant.eventually(lambda s: s["belts/label_chains/speed"] < -1.0, within=5.0)
+    assert "label_wedged" in plant.alarms and "single_wedged" not in plant.alarms
+    assert plant.signals["belts/cold/running"] == 0.0 < plant.signals["belts/label_lane/speed"]
+    plant.inject("photo_eyes/label_standing/stuck_on", 0)
+    plant.eventually(lambda s: s["belts/label_chains/speed"] == 1.75, within=4.0)
+    assert "label_wedged" not in plant.alarms
+
+
 def test_the_failure_of_the_depalletiser_explains_the_low_supply(line: Lines) -> None:
     early = {
         "machines": {"depalletiser": {"failures": {"pallet": {"between": {"mean": 0.5}, "repair": {"mean": 2.0}}}}}
