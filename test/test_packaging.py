@@ -71,7 +71,9 @@ def test_a_shipped_folder_of_programs_is_found_by_name(tmp_path: Path, monkeypat
 
 @pytest.mark.parametrize("name", ["no_such_scene", "elsewhere/two_bottles.yaml"])
 def test_an_unknown_scene_is_refused_with_the_names_there_are(name: str) -> None:
-    with pytest.raises(SceneError, match=stating(name, "no such scene file", "accumulation_table", "two_bottles")):
+    with pytest.raises(
+        SceneError, match=stating(name, "no such scene file", "accumulation_table", "brewery/hall", "two_bottles")
+    ):
         scene_path(name)
 
 

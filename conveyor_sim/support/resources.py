@@ -65,6 +65,7 @@ def scene_path(name_or_path: str | Path) -> Path:
     shipped = in_config(path.with_suffix(".yaml") if path.name else path)
     if shipped is not None and os.path.isfile(shipped):
         return shipped
-    scenes = [*config_dir().glob("*.yaml"), *config_dir().glob("scenarios/*.yaml")]
+    # Beside the hall are parts of lines, which are no scenes.
+    scenes = [*config_dir().glob("*.yaml"), *config_dir().glob("scenarios/*.yaml"), config_dir() / "brewery/hall.yaml"]
     names = ", ".join(sorted(scene.relative_to(config_dir()).with_suffix("").as_posix() for scene in scenes))
     raise SceneError(f"{name_or_path}: no such scene file; expected a path, or the name of a shipped scene ({names})")
