@@ -100,13 +100,17 @@ REMADE = (
 
 TIED: Mapping[str, tuple[str, ...]] = {
     "pairs.spring.": ("pairs.used", "pairs.i", "pairs.j"),
-    "pairs.impulse.": ("pairs.used", "pairs.i", "pairs.j"),
+    "pairs.impulse.row": ("pairs.used", "pairs.i", "pairs.j", "pairs.impulse.place"),
+    "pairs.impulse.kept_count": (),
     "near_segments.impulse.": ("near_segments.start", "near_segments.piece"),
     "near_arcs.impulse.": ("near_arcs.start", "near_arcs.piece"),
     "near_segments.springs.": ("near_segments.start", "near_segments.piece"),
     "near_arcs.springs.": ("near_arcs.start", "near_arcs.piece"),
 }
-"""Arrays of tangential springs and of impulses, which are state, and the lists whose entries they belong to."""
+"""Arrays of tangential springs and of impulses, which are state, and the lists whose entries they belong to.
+
+The other arrays of `pairs.impulse` are written anew in each rebuild, before they are read.
+"""
 
 IN_REBUILDS = (".kept", ".kept_i", ".kept_j", ".kept_bottle", ".kept_piece", ".next")
 """Ends of the names of arrays among those that hold something only while lists are rebuilt, so not between ticks."""
