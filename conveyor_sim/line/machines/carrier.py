@@ -51,7 +51,7 @@ class CarrierDevice(ProcessingDevice):
         """Move the carrier. Take the bottle that has waited longest, if one is due and there is room for it."""
         if self._busy:
             self.advance(now)
-        slot_of = self.queue(now)
+        self.queue(now)
         before = self.cycle
         due = self.turn(now)
         if self.carried:
@@ -63,7 +63,7 @@ class CarrierDevice(ProcessingDevice):
             self.wait()
         elif len(self.carried) < self._capacity and self.goes_on():
             first, *others = self.waiting
-            self._load(now.state.hold(slot_of[first]))
+            self._load(now.state.hold(now.state.slot_of(first)))
             self.waiting = tuple(others)
 
     def _load(self, bottle: int) -> None:

@@ -4,7 +4,7 @@
 Stations work on a bottle for one cycle, and give it back at another place.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from conveyor_sim.line.device import ScanContext
 from conveyor_sim.line.devices.bottle_work import BottleWork, work_tags
@@ -39,14 +39,12 @@ class TakingDevice(MachineDevice):
         self._run_down_ticks = setup.ticks(part.run_down)
         self.waiting = ()
 
-    def queue(self, now: ScanContext) -> Mapping[int, int]:
-        """Update `waiting`, and return the slots of the waiting bottles by their ids."""
-        slots = self._region.inside(now)
-        slot_of = dict(zip(now.state.world.bottles.id[slots].tolist(), slots.tolist(), strict=True))
-        if slot_of.keys() != set(self.waiting):
-            stayed = tuple(bottle for bottle in self.waiting if bottle in slot_of)
-            self.waiting = (*stayed, *sorted(slot_of.keys() - set(stayed)))
-        return slot_of
+    def queue(self, now: ScanContext) -> None:
+        """Update `waiting`."""
+        inside = set(now.state.world.bottles.id[self._region.inside(now)].tolist())
+        if inside != set(self.waiting):
+            stayed = tuple(bottle for bottle in self.waiting if bottle in inside)
+            self.waiting = (*stayed, *sorted(inside.difference(stayed)))
 
     def ready(self, now: ScanContext) -> bool:
         """Return True if enough bottles wait to start or resume, or if the machine has run empty.
@@ -103,7 +101,7 @@ class SinkDevice(TakingDevice):
         """Take the bottles that have waited longest, if they are due and all there."""
         if self._busy:
             self.advance(now)
-        slot_of = self.queue(now)
+        self.queue(now)
         cause = NONE
         if self.turn(now):
             self._complete()
@@ -116,7 +114,7 @@ class SinkDevice(TakingDevice):
                 bad = sum(bottle in now.bad for bottle in taken)
                 self.holds, self.holds_bad = (len(taken), bad) if self._batch > 1 else (True, bool(bad))
                 for bottle in taken:
-                    now.state.remove(slot_of[bottle])
+                    now.state.remove(now.state.slot_of(bottle))
                 self.removed += len(taken)
                 self.removed_bad += bad
                 self.cycle -= 1.0
@@ -239,13 +237,13 @@ class StationDevice(ProcessingDevice):
         """Take the bottle that has waited longest, if the station is empty."""
         if self._busy:
             self.advance(now)
-        slot_of = self.queue(now)
+        self.queue(now)
         if self.holding == EMPTY and self.works and self.waiting and self.goes_on():
             # The cycle begins now if the station was starved, else when the last bottle left.
             late = self.cause == STARVED
             self.begun, self.cycle = (now.tick, 0.0) if late else (now.tick - 1, self.cycle)
             first, *others = self.waiting
-            self.holding = now.state.hold(slot_of[first])
+            self.holding = now.state.hold(now.state.slot_of(first))
             self.waiting = tuple(others)
 
     def feed(self, now: ScanContext) -> None:

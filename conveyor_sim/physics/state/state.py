@@ -57,6 +57,10 @@ class State:
         self.next_id += 1
         return self.next_id - 1
 
+    def slot_of(self, bottle: int) -> int:
+        """Return the slot of a bottle on the line, by its id. Raise IndexError if it is not there."""
+        return int(np.flatnonzero(self.world.bottles.id == bottle)[0])
+
     def hold(self, slot: int) -> int:
         """Take the bottle in a slot off the line until `give` returns it. Return its id."""
         world = self.world
