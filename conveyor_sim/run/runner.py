@@ -90,8 +90,8 @@ def run_scene(
         outputs.start()
         outputs.show_run(RunState(RUNNING))
         peaks = PeakWatch(simulation)
-        stepping, start = 0.0, time.monotonic()
-        while simulation.tick < scene.duration_ticks and not stop.is_set():
+        stepping, start, end = 0.0, time.monotonic(), scene.duration_ticks
+        while simulation.tick < end and not stop.is_set():
             began = time.perf_counter()
             try:
                 if operator is not None:
@@ -110,7 +110,7 @@ def run_scene(
             peaks.after_tick()
             if progress is not None:
                 progress(simulation.time)
-        stopped = simulation.tick < scene.duration_ticks
+        stopped = simulation.tick < end
         outputs.show_run(RunState(STOPPED, "on request") if stopped else RunState(ENDED))
         if recorder is not None:
             recorder.close()

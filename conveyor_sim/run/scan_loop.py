@@ -13,7 +13,7 @@ from typing import Any, Protocol
 from conveyor_sim.bag.outputs import OutputWriter
 from conveyor_sim.control.memory import restore, snapshot
 from conveyor_sim.control.recorded import RecordedVariables
-from conveyor_sim.control.scan import ALARMS, ControlError, Controller, Inputs, LineTags, bind, declared_alarms
+from conveyor_sim.control.scan import ControlError, Controller, Inputs, LineTags, alarm_names, bind, declared_alarms
 from conveyor_sim.errors import CommandError, ConveyorError
 from conveyor_sim.line.commands.inputs import DECLARE, OWN, CommandOutcome, Input
 from conveyor_sim.line.tag import CONTROLLED, ProcessImage, of_roles
@@ -145,11 +145,11 @@ class ScanLoop:
         if self._attached is not None:
             self._simulation.give(Input(self._attached.source, self._attached.writer, "controller", OWN, (), ()))
 
-    def scan(self, inputs: Inputs) -> list[str]:
+    def scan(self, inputs: Inputs) -> tuple[str, ...]:
         """Scan once. Return the names of the alarms in the answer. Raise ControlError if there is no valid answer."""
         assert self._attached is not None
         self._answer = self._attached.scan(inputs, self.alarms)
-        return [name for name in self._answer if name.startswith(ALARMS)]
+        return alarm_names(tuple(self._answer))
 
     def give(self) -> None:
         """Queue the commands of the last scan for the next tick."""

@@ -133,7 +133,7 @@ class StructuredText:
         self._force()
         self.program.run(round(inputs.time * _NS))
         self._force()
-        return {tag: limits.get(value := read(), value) for tag, read, limits in self._outs}
+        return {tag: limits.get(value := float(read()), value) for tag, read, limits in self._outs}
 
     def _limits_of(self, variable: Variable, tag: str) -> dict[float, float]:
         """Return the limits of an output by their values rounded to its type, which count as the limits themselves."""

@@ -56,11 +56,10 @@ class Variable:
 
     @property
     def reader(self) -> Callable[[], float]:
-        """Function that returns `number`, in less time."""
+        """Function that returns `number` in less time; a bool or an integer if the value is one."""
         if self._path or isinstance(self._last, int) or self.type.base.kind not in ("bool", "int", "real"):
             return self.number
-        get = partial(getattr, self._owner, self._last)
-        return lambda: float(get())
+        return partial(getattr, self._owner, self._last)
 
     @property
     def writer(self) -> Callable[[Any], None]:

@@ -127,7 +127,8 @@ class CarouselDevice(BottleWork, Device):
         """Return the slot of the bottle in a pocket, -1 if it is empty."""
         x, y = self._wheel.pocket(pocket, turned)
         bottles, reach = now.state.world.bottles, WITHIN * self._wheel.part.pocket_radius
-        near = np.flatnonzero((abs(bottles.x - x) <= reach) & (abs(bottles.y - y) <= reach) & (bottles.id >= 0))
+        near = np.flatnonzero(abs(bottles.x - x) <= reach)
+        near = near[(abs(bottles.y[near] - y) <= reach) & (bottles.id[near] >= 0)]
         if not near.size:
             return -1
         apart = np.hypot(bottles.x[near] - x, bottles.y[near] - y)

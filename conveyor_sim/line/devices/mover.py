@@ -190,9 +190,10 @@ def profile_to(position: float, speed: float, target: float, max_speed: float, a
 
 def position_at(profile: F8, seconds: float) -> float:
     """Return the position on a motion profile `seconds` after its start."""
-    k = max(0, int(np.searchsorted(profile[:, 0], seconds, side="right")) - 1)
-    since = seconds - profile[k, 0]
-    return float(profile[k, 1] + (profile[k, 2] + 0.5 * profile[k, 3] * since) * since)
+    k = max(0, int(profile[:, 0].searchsorted(seconds, side="right")) - 1)
+    start, position, speed, acceleration = profile[k].tolist()
+    since = seconds - start
+    return float(position + (speed + 0.5 * acceleration * since) * since)
 
 
 def later(profile: F8, seconds: float) -> F8:

@@ -61,6 +61,10 @@ class TimeAccount:
         """Return the ticks by category, the present category included."""
         return {**self.ticks, self.category: self.ticks[self.category] + tick - self.since}
 
+    def ticks_of(self, category: Category, tick: int) -> int:
+        """Return the ticks in one category up to a tick."""
+        return self.ticks[category] + (tick - self.since if category == self.category else 0)
+
     def set_work_up_to(self, tick: int) -> float:
         """Return the sum of set rate x ticks running."""
         return self.set_work + (self.rate * (tick - self.since) if self.category == "running" else 0.0)

@@ -396,7 +396,7 @@ class MachineDevice(Device):
 
     def waited_time(self, category: Category, ticks: int, now: ScanContext) -> float:
         """Return the total time starved or blocked, s. ticks: number of ticks at whose end it waited."""
-        return (ticks if self._counts_starts else self.time.up_to(now.tick)[category]) * now.length
+        return (ticks if self._counts_starts else self.time.ticks_of(category, now.tick)) * now.length
 
     @property
     def begun_part(self) -> float:
