@@ -94,6 +94,13 @@ class BottlingLine:
     block: FillerBlock
     source: str
     """Machine that feeds the line."""
+    supply: str
+    """Belt that it feeds."""
+    full: float
+    """Number of bottles on this belt at which the source stands, because it would press more into them than they have
+    room for."""
+    room: float
+    """Number of bottles at which it continues."""
     machines: Sequence[str]
     """Other machines."""
     belts: Sequence[str]
@@ -114,6 +121,7 @@ class BottlingLine:
     _waited: int = 0
     _ready: bool = True
     _start: bool = field(default=True)
+    _full: bool = False
 
     def scan(self, inputs: Inputs) -> Mapping[str, float]:
         """Return the commands of one scan."""
@@ -122,6 +130,8 @@ class BottlingLine:
         starts = start and not self._start
         self._start = start
         self._ready = powered and (self._ready or inputs["panel/reset/contact"] != 0.0)
+        supplied = inputs[f"belts/{self.supply}/bottles"]
+        self._full = supplied >= self.full or (self._full and supplied > self.room)
         self._step = self._next(inputs, starts, self._ready and inputs["panel/stop/contact"] != 0.0)
         runs = self._step in (LineStep.RUNNING, LineStep.EMPTYING)
         self.block.run_empty = self._step == LineStep.EMPTYING
@@ -130,7 +140,7 @@ class BottlingLine:
             **self.formats[self._format],
             "panel/horn/on": float(self._step == LineStep.WARNING),
             "panel/empties/on": float(self._step == LineStep.EMPTYING),
-            f"machines/{self.source}/run": float(self._step == LineStep.RUNNING),
+            f"machines/{self.source}/run": float(self._step == LineStep.RUNNING and not self._full),
         }
         for belt in self.belts:
             commands[f"belts/{belt}/run"] = float(runs)
@@ -176,6 +186,9 @@ def brewery(supply: float = 9.0, buffer: float = 8.0) -> Controller:
             ("inlet", "filler", "outlet", "capper"), master="master", cell="block_", top_rate=40_000, top_speed=1.75
         ),
         source="depalletiser",
+        supply="supply",
+        full=2400 * supply / 9.0,
+        room=2200 * supply / 9.0,
         machines=("rinser", "pasteuriser", "labeller", "packer"),
         belts=("spread", "filled", "leaving", "wide", "packing", *(f"{cell}_lane" for cell in cells)),
         combiners=(Combiner("single", "supply", (0.046, 0.12)), Combiner("label", "cold", (0.05, 0.12))),

@@ -95,6 +95,8 @@ def script(first: Mapping[str, float]) -> Iterator[Mapping[str, float]]:
             signals["machines/camera/bad_time"] = (scan - chance.random()) * LENGTH
         signals["panel/rate/value"] = (40_000.0, 25_000.0)[scan // 1000 % 2]
         signals["carousels/block_valves/good"] = float(scan)
+        # The supply is full, and has room again.
+        signals["belts/supply/bottles"] = 2100.0 + 5.0 * abs((scan - 160) % 140 - 70) if 160 <= scan < 700 else 0.0
         # Few enough bottles from scan 2400 on, but for one that comes out of a wheel.
         signals["belts/spread/bottles"] = 30.0 if scan < 2400 else 23.0
         signals["belts/block_discharge/bottles"] = float(scan == 2600)
@@ -130,6 +132,7 @@ def test_the_project_is_its_twin(line: FirstScan, expected: list[Mapping[str, fl
         ("line.st", "waited > SETTLE_TIME", "waited >= SETTLE_TIME"),
         ("line.st", "powered AND (ready OR reset_button)", "powered"),
         ("line.st", "bottles > REMAINDER", "bottles >= REMAINDER"),
+        ("line.st", "on_supply > SUPPLY_ROOM", "on_supply >= SUPPLY_ROOM"),
         ("combiner.st", "waited > STUCK", "waited >= STUCK"),
         ("combiner.st", "NOT full AND left = 0", "NOT full"),
         ("block.st", "queued OR empties", "queued"),
