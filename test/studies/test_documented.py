@@ -35,7 +35,7 @@ def test_results_that_are_shipped_are_those_of_the_study_beside_them(path: Path)
     found = read_results(path.parent / "results.parquet")
     assert found.study == path.read_text(encoding="utf-8")
     assert {row.status for row in found.rows} == {"finished"}
-    assert sum(row.cpu for row in found.rows) < 30.0 * 60.0
+    assert sum(row.cpu for row in found.rows) < 60.0 * 60.0  # so that a slower machine can repeat it, too
 
 
 def test_the_first_study_is_the_example() -> None:
