@@ -97,8 +97,7 @@ class BottlingLine:
     supply: str
     """Belt that it feeds."""
     full: float
-    """Number of bottles on this belt at which the source stands, because it would press more into them than they have
-    room for."""
+    """Number of bottles on this belt at which the source stands, because there is no room for another layer."""
     room: float
     """Number of bottles at which it continues."""
     machines: Sequence[str]
